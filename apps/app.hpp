@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// What the programs share: their options, Ctrl-C, and the three exit statuses.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <csignal>
+#include <cstdlib>
+#include <filesystem>
+#include <fmt/format.h>
+#include <string>
+#include <vector>
+
+#include "ves/config/experiment.hpp"
+#include "ves/run/run.hpp"
+
+namespace ves::app {
+
+inline constexpr int kDone = 0;      // the run went well
+inline constexpr int kTripped = 1;   // a check stopped it, or a comparison failed
+inline constexpr int kBadInput = 2;
+
+inline volatile std::sig_atomic_t stop_requested = 0;
+
+/// Ctrl-C and SIGTERM ask for a gentle end.
+inline void catchSignals() {
+  struct sigaction action {};
+  action.sa_handler = [](int) { stop_requested = 1; };
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+}
+
+/// Which experiment, and on which bus.
+struct Options {
+  std::string scenario;
+  std::vector<std::string> overrides;
+  std::int64_t seed = -1;
+  bool private_bus = false;
+  ProcessOptions process;
+
+  void addExperiment(CLI::App& cli) {
+    cli.add_option("scenario", scenario, "name in config/scenarios, or a .yaml file")->required();
+    cli.add_option("--set", overrides, "KEY.PATH=VALUE as if it stood in the scenario")
+        ->allow_extra_args(false);
+    cli.add_option("--seed", seed, "of the plant's noise")->check(CLI::Range(0, INT32_MAX));
+  }
+  void addBus(CLI::App& cli) {
+    cli.add_option("--url", process.url, "LCM bus")->capture_default_str();
+    cli.add_flag("--lockstep", process.lockstep, "as fast as possible, nothing waits on a clock");
+    cli.add_flag("--realtime", process.realtime, "insist on SCHED_FIFO and locked memory");
+    cli.add_flag("--private-bus", private_bus, "on a network of this run's own");
+  }
+
+  Experiment load() const {
+    const char* config = std::getenv("VES_CONFIG_DIR");
+    std::vector<std::string> all = overrides;
+    if (seed >= 0) all.push_back(fmt::format("seed={}", seed));
+    return loadExperiment(findScenario(scenario, config ? config : "config"), all);
+  }
+};
+
+/// Parses, runs, and turns bad input into one line and status 2.
+inline int run(CLI::App& cli, int argc, char** argv, const std::function<int()>& body) {
+  try {
+    cli.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return cli.exit(error);  // --help
+    fmt::print(stderr, "{}: {} (see --help)\n", cli.get_name(), error.what());
+    return kBadInput;
+  }
+  try {
+    return body();
+  } catch (const InputError& error) {
+    fmt::print(stderr, "{}: {}\n", cli.get_name(), error.what());
+    return kBadInput;
+  }
+}
+
+inline void printWarnings(const Experiment& experiment) {
+  for (const std::string& warning : experiment.warnings)
+    fmt::print(stderr, "warning: {}\n", warning);
+}
+
+}  // namespace ves::app

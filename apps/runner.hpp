@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// What `run` and `demo` do: an experiment from start to its folder of results.
+#pragma once
+
+#include <fmt/chrono.h>
+#include <fstream>
+
+#include "app.hpp"
+#include "ves/report/outcome.hpp"
+
+namespace ves::app {
+
+struct RunnerOptions : Options {
+  std::string out;
+  bool two_processes = false;
+  bool plots = true;
+};
+
+inline void writeFile(const std::filesystem::path& file, const std::string& text) {
+  std::ofstream out(file);
+  out << text;
+  out.flush();
+  if (!out) throw InputError(file.string() + ": cannot be written");
+}
+
+inline int runExperiment(RunnerOptions& options) {
+  const Experiment experiment = options.load();
+  printWarnings(experiment);
+  if (options.out.empty())
+    options.out = fmt::format("ves-runs/{}-{:%Y%m%d-%H%M%S}", experiment.name,
+                              fmt::localtime(std::time(nullptr)));
+  const std::filesystem::path folder = makeFolder(options.out);
+  const std::filesystem::path log = folder / "run.lcmlog", resolved = folder / "experiment.yaml";
+  writeFile(resolved, experiment.resolved);
+  catchSignals();
+
+  Progress progress(experiment);
+  RunResult result;
+  if (options.process.lockstep && !options.two_processes) {
+    LogWriter writer(log.string());
+    result = runLockstep(experiment, &writer, [&](const TickState& state) {
+      double x[6];
+      Vec6::Map(x) = state.motion.x;
+      progress.show(state.phase, state.segment, state.tick, x);
+      return stop_requested ? Request::kStop : Request::kNone;
+    });
+  } else {
+    if (!options.private_bus && !busWorks(options.process.url)) {
+      fmt::print(stderr, "multicast does not come back on this machine: using a private bus\n");
+      options.private_bus = true;
+    }
+    if (options.private_bus) enterPrivateBus();
+    LaunchOptions launch{options.process, std::filesystem::read_symlink("/proc/self/exe").parent_path(),
+                         resolved};
+    launch.process.log = log.string();
+    result = runProcesses(
+        experiment, launch,
+        [&](const state_t& s) {
+          progress.show(static_cast<Phase>(s.phase), s.segment, s.header.sequence, s.x);
+        },
+        [] { return stop_requested != 0; });
+  }
+  progress.end();
+  fmt::print("{}", writeOutcome(folder, result, options.plots));
+  return result.good() ? kDone : kTripped;
+}
+
+}  // namespace ves::app

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// YAML documents that remember where each value came from. yaml-cpp parses; this adds what a person
+// needs when a file is wrong: one line, `file:line: key: what is wrong, what is allowed`.
+//
+// A map may start `from: other.yaml` and then names only what differs. A tag says where a number was
+// got: !found (a cited source), !derived (computed from one), !substitute (a stand-in); none: the
+// report's own, or a choice of the experiment. A tag covers what stands below it.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <filesystem>
+#include <initializer_list>
+#include <memory>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace ves {
+
+/// Bad input. The message is the whole line that a person sees; the programs end with status 2.
+class InputError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// One value of a document.
+struct Value {
+  enum class Kind { kNull, kScalar, kList, kMap };
+  Kind kind = Kind::kNull;
+  std::string text;                // of a scalar
+  std::string tag;                 // "substitute", ...; empty
+  std::vector<std::string> keys;   // of a map, beside children
+  std::vector<Value> children;     // of a list or map
+  std::shared_ptr<const std::string> file;
+  int line = 0;
+
+  const Value* find(std::string_view key) const;
+  Value* find(std::string_view key);
+};
+
+/// Reads a file with everything it is made from, `from` and `urdf` replaced by what they name.
+Value loadDocument(const std::filesystem::path& path);
+
+/// Parses text that stands for a file of this name; nothing else is read.
+Value parseDocument(const std::string& text, const std::string& name);
+
+/// Applies "a.b.c=value" as if it stood in the file.
+void override(Value& document, const std::string& assignment);
+
+/// YAML that parseDocument() reads back to the same document.
+std::string emit(const Value& document);
+
+/// A map on its way into a struct: knows its name, counts which keys were asked for.
+class Section {
+ public:
+  Section(const Value& value, std::string path);
+
+  bool has(std::string_view key);
+
+  /// A number in [lo, hi]; NaN is in no interval.
+  double number(std::string_view key, double lo, double hi);
+  std::int64_t integer(std::string_view key, std::int64_t lo, std::int64_t hi);
+  bool flag(std::string_view key);
+  std::string text(std::string_view key);
+  std::string choice(std::string_view key, std::initializer_list<std::string_view> allowed);
+  /// `size` numbers; any number of them (at least one) when size is -1.
+  Eigen::VectorXd vector(std::string_view key, int size, double lo, double hi);
+  /// rows x cols numbers, row by row; as many columns as the first row has when cols is -1.
+  Eigen::MatrixXd matrix(std::string_view key, int rows, int cols, double lo, double hi);
+
+  Section section(std::string_view key);
+  std::vector<Section> list(std::string_view key);
+
+  /// The only key of this map, which names its kind.
+  std::string onlyKey(std::initializer_list<std::string_view> allowed,
+                      std::initializer_list<std::string_view> besides);
+
+  /// Refuses keys that nobody asked for.
+  void finish() const;
+
+  [[noreturn]] void fail(std::string_view key, const std::string& what) const;
+  const std::string& path() const { return path_; }
+
+ private:
+  const Value& need(std::string_view key);
+  [[noreturn]] void failAt(const Value& at, const std::string& path, const std::string& what) const;
+  double toNumber(const Value& value, const std::string& path, double lo, double hi) const;
+
+  const Value* value_;
+  std::string path_;
+  std::set<std::string, std::less<>> used_;
+};
+
+}  // namespace ves

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "ves/config/document.hpp"
+#include "ves/control/test_platform.hpp"
+#include "ves/plant/plant.hpp"
+
+namespace ves {
+
+/// One experiment, complete: what the controller believes, what the plant is, and the text both came
+/// from.
+struct Experiment {
+  std::string name;
+  std::string description;
+  ControllerConfig controller;
+  plant::PlantConfig plant;
+  std::vector<std::string> joint_names;
+  std::vector<std::string> warnings;
+  int substitutes = 0;   // [-] numbers that stand in for unknown ones
+  std::string resolved;  // YAML with everything inside, URDF too; parseExperiment() reads it back
+  std::string hash;      // of `resolved`
+};
+
+/// Reads a scenario file; `overrides` are "key.path=value". Throws InputError.
+Experiment loadExperiment(const std::filesystem::path& file,
+                          const std::vector<std::string>& overrides = {});
+
+/// Reads back what Experiment::resolved holds; `name` stands for a file name in messages.
+Experiment parseExperiment(const std::string& resolved, const std::string& name);
+
+/// The file of a scenario given by path or by its name in `config`/scenarios. Throws InputError,
+/// listing what there is.
+std::filesystem::path findScenario(const std::string& scenario,
+                                   const std::filesystem::path& config);
+
+}  // namespace ves

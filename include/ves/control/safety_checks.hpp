@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Safety checks (Appendix C). Each is one function that tells whether its requirement holds, and one
+// bit. A value that is not a number never satisfies a requirement.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+
+#include "ves/control/sample.hpp"
+
+namespace ves {
+
+/// In order of priority: of checks that trip in the same tick the first is the cause.
+enum class Check : std::uint32_t {
+  kPanicButton,
+  kFloorMat,
+  kFinite,             // a number that is not one, anywhere in the tick
+  kStale,              // no new sample for too long
+  kForwardKinematics,  // the measured legs belong to no pose
+  kPositionError,
+  kMotionLimits,
+  kActuatorLimits,
+  kJointLimits,
+  kCollide,
+  kVelocity,
+  kFlow,
+  kRival,              // somebody else commands the legs
+  kCount
+};
+
+std::string_view name(Check check) noexcept;
+
+/// A set of tripped checks.
+class Tripped {
+ public:
+  Tripped() = default;
+  explicit Tripped(std::uint32_t bits) : bits_(bits) {}
+
+  /// Records the check unless its requirement holds.
+  void require(Check check, bool holds) noexcept {
+    if (!holds) bits_ |= bit(check);
+  }
+  bool has(Check check) const noexcept { return (bits_ & bit(check)) != 0; }
+  bool any() const noexcept { return bits_ != 0; }
+  std::uint32_t bits() const noexcept { return bits_; }
+  /// The tripped check of highest priority; kCount when none.
+  Check first() const noexcept;
+
+  Tripped operator|(Tripped other) const noexcept { return Tripped(bits_ | other.bits_); }
+
+ private:
+  static constexpr std::uint32_t bit(Check check) { return 1u << static_cast<std::uint32_t>(check); }
+  std::uint32_t bits_ = 0;
+};
+
+struct SafetyLimits {
+  double leg_velocity = 0.0;      // [m/s] commanded
+  double position_error = 0.0;    // [m] commanded minus measured length
+  double translation = 0.0;       // [m] of each coordinate from home
+  double rotation = 0.0;          // [rad] of each coordinate from home
+  double leg_min = 0.0;           // [m]
+  double leg_max = 0.0;           // [m]
+  double joint_cone = 0.0;        // [rad] half angle about a joint's own axis
+  double leg_clearance = 0.0;     // [m] least distance between the axes of two legs
+  double bore_area = 0.0;         // [m^2] fed when a leg extends
+  double rod_side_area = 0.0;     // [m^2] fed when it retracts
+  double flow = 0.0;              // [m^3/s] of one leg
+  int stale_ticks = 0;            // [-] ticks without a new sample
+};
+
+/// Successive commanded lengths differ by no more than leg_velocity allows in one period.
+bool velocityCheck(const SafetyLimits&, const Vec6& L, const Vec6& L_last, double period) noexcept;
+
+/// The commanded length is near the measured one.
+bool positionErrorCheck(const SafetyLimits&, const Vec6& L_commanded,
+                        const Vec6& L_measured) noexcept;
+
+/// No two legs come closer than leg_clearance.
+bool collideCheck(const SafetyLimits&, const Geometry&, const Transform& X_IP) noexcept;
+
+/// Every coordinate is inside the workspace.
+bool motionLimitsCheck(const SafetyLimits&, const Pose& x) noexcept;
+
+/// Every leg is within its stroke.
+bool actuatorLimitsCheck(const SafetyLimits&, const Vec6& L) noexcept;
+
+/// The flow that each leg's change of length takes is available.
+bool flowLimitsCheck(const SafetyLimits&, const Vec6& L, const Vec6& L_last,
+                     double period) noexcept;
+
+/// Axes of the ball joints: along the legs at home.
+class JointAxes {
+ public:
+  explicit JointAxes(const Geometry& geometry) noexcept;
+
+  /// Every leg is inside the cones of its base and platform joints.
+  bool check(const SafetyLimits&, const Geometry&, const Transform& X_IP) const noexcept;
+
+ private:
+  std::array<Vec3, kLegs> base_I_{};      // [-] unit vectors
+  std::array<Vec3, kLegs> platform_P_{};  // [-]
+};
+
+/// Least distance between the segments ab and cd.
+double segmentDistance(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) noexcept;
+
+}  // namespace ves

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// What the controller may know of the machine: counts, joint angles, switches. Nothing else.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "ves/kinematics/stewart.hpp"
+#include "ves/robot/robot_model.hpp"
+
+namespace ves {
+
+inline constexpr int kWrenchChannels = 6;
+inline constexpr int kAdcChannels = 7;  // six of the wrench, then hydraulic pressure
+
+using AdcCounts = std::array<std::int32_t, kAdcChannels>;
+using LegCounts = std::array<std::int32_t, kLegs>;
+
+/// Safety loops that are closed when nobody touches them: a broken wire reads as pressed.
+enum Switch : std::uint32_t { kPanicButtonClosed = 1u, kFloorMatClosed = 2u };
+inline constexpr std::uint32_t kAllSwitchesClosed = kPanicButtonClosed | kFloorMatClosed;
+
+struct Sample {
+  std::int64_t sequence = -1;  // [-] counts up by one; -1: nothing received yet
+  std::int64_t time = 0;       // [ns] the plant's clock when it was taken
+  AdcCounts adc{};             // [count]
+  LegCounts legs{};            // [count] Temposonics
+  JointVector q = JointVector::Zero();  // [rad | m] the robot's joints
+  std::uint32_t switches = 0;           // bits of Switch
+};
+
+struct LegCommand {
+  bool engaged = false;  // false: the legs stay where they are and ignore the counts
+  LegCounts counts{};    // [count] (C.13)
+  std::int32_t segment = -1;  // [-] where the program is; other equipment takes its cue from it
+};
+
+}  // namespace ves

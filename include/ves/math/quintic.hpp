@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+
+namespace ves {
+
+/// Value, rate and acceleration of a path in N coordinates.
+template <int N>
+struct PathPoint {
+  Eigen::Matrix<double, N, 1> x = Eigen::Matrix<double, N, 1>::Zero();
+  Eigen::Matrix<double, N, 1> x_dot = Eigen::Matrix<double, N, 1>::Zero();
+  Eigen::Matrix<double, N, 1> x_ddot = Eigen::Matrix<double, N, 1>::Zero();
+};
+
+/// The fifth-order polynomial (report, chapter 3) from any state to rest: ends at x1 with zero rate
+/// and acceleration, and stays there.
+template <int N>
+class Quintic {
+ public:
+  using Vector = Eigen::Matrix<double, N, 1>;
+
+  Quintic() = default;
+  Quintic(const PathPoint<N>& from, const Vector& to, double duration) noexcept
+      : T_(duration), end_(to) {
+    const Vector h = to - from.x, v = from.x_dot * T_, a = from.x_ddot * (T_ * T_);
+    c_.col(0) = from.x;
+    c_.col(1) = v;
+    c_.col(2) = 0.5 * a;
+    c_.col(3) = 10.0 * h - 6.0 * v - 1.5 * a;
+    c_.col(4) = -15.0 * h + 8.0 * v + 1.5 * a;
+    c_.col(5) = 6.0 * h - 3.0 * v - 0.5 * a;
+  }
+
+  PathPoint<N> at(double t) const noexcept {
+    PathPoint<N> point;
+    point.x = end_;
+    if (!(t < T_)) return point;
+    const double u = t < 0.0 ? 0.0 : t / T_;
+    using Six = Eigen::Matrix<double, 6, 1>;
+    point.x = c_ * (Six() << 1.0, u, u * u, u * u * u, u * u * u * u, u * u * u * u * u).finished();
+    point.x_dot = c_ * (Six() << 0.0, 1.0, 2.0 * u, 3.0 * u * u, 4.0 * u * u * u,
+                        5.0 * u * u * u * u).finished() / T_;
+    point.x_ddot = c_ * (Six() << 0.0, 0.0, 2.0, 6.0 * u, 12.0 * u * u, 20.0 * u * u * u).finished() /
+                   (T_ * T_);
+    return point;
+  }
+
+  double duration() const noexcept { return T_; }  // [s]
+  const Vector& end() const noexcept { return end_; }
+
+ private:
+  double T_ = 0.0;  // [s]
+  Vector end_ = Vector::Zero();
+  Eigen::Matrix<double, N, 6> c_ = Eigen::Matrix<double, N, 6>::Zero();  // powers of t/T
+};
+
+/// Peak rate of a rest-to-rest quintic over its mean rate.
+inline constexpr double kQuinticPeakRate = 1.875;  // [-]
+
+}  // namespace ves

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Everything that was metal, on one event schedule:
+//
+//   every 341 us   six Temposonics readings into six LegSlaves
+//   every 1023 us  new valve currents (a LegSlave's second reading), and half a period later, in the
+//                  middle of the constant current, one look at the mechanics: forward kinematics,
+//                  Newton-Euler on the moving base, force-torque sensor
+//   when asked     a sample, at that very moment
+//
+// The periods are no multiples of each other. Between events the actuators are integrated exactly.
+#pragma once
+
+#include <vector>
+
+#include "ves/control/sample.hpp"
+#include "ves/math/quintic.hpp"
+#include "ves/plant/actuator.hpp"
+#include "ves/plant/force_torque_sensor.hpp"
+#include "ves/plant/leg_slave.hpp"
+#include "ves/robot/newton_euler.hpp"
+#include "ves/robot/payload.hpp"
+
+namespace ves::plant {
+
+/// Where the report's Filters 1 to 3 sit (figure 2.15).
+enum class LegFilters {
+  kNone,
+  kOutputs  // one each on the position, velocity and acceleration that forward kinematics reads
+};
+
+/// A fifth-order motion of one joint, from wherever it is.
+struct RobotMove {
+  int joint = 0;          // [-] from 0
+  double target = 0.0;    // [rad | m]
+  double duration = 1.0;  // [s]
+};
+
+/// When something happens: `after` the controller's program reached `segment`.
+struct Cue {
+  int segment = 0;         // [-]
+  std::int64_t after = 0;  // [ns]
+};
+
+struct RobotEvent {
+  Cue cue;
+  RobotMove move;
+};
+
+/// A safety loop held open for `duration`.
+struct SwitchEvent {
+  Cue cue;
+  std::int64_t duration = 0;   // [ns]
+  std::uint32_t switches = 0;  // bits of Switch
+};
+
+struct PlantConfig {
+  Geometry geometry;
+  Pose initial_pose;  // about home
+  LegSlaveGains leg_slave;
+  ActuatorModel actuator;
+  Temposonics transducer;
+  LegFilters filters = LegFilters::kNone;
+  double filter_cutoff = 30.0;  // [rad/s] of Filters 1 to 3
+  ForceTorqueSensorModel sensor;
+  Payload payload;                   // as it is
+  Vec3 gravity = {0.0, 0.0, -9.81};  // [m/s^2] g_I
+  JointVector initial_joints = JointVector::Zero();
+  std::vector<RobotEvent> robot_events;
+  std::vector<SwitchEvent> switch_events;
+  std::uint32_t seed = 1;
+};
+
+/// What nobody but a simulation can know; the controller never reads it.
+struct Truth {
+  std::int64_t time = 0;     // [ns]
+  BodyMotion P;              // platform
+  Pose x;                    // about home
+  Wrench F_Po_I;             // on the platform from all the sensor carries
+  JointState joints;
+  LegMotion legs;            // of the actuators, unfiltered
+  Vec6 current = Vec6::Zero();  // [A] valves
+  bool legs_agree = true;    // forward kinematics found a pose
+};
+
+class Plant {
+ public:
+  static constexpr std::int64_t kNever = INT64_MAX;
+
+  explicit Plant(const PlantConfig& config);
+
+  /// References of the LegSlaves, from now on. The cues of a segment count from the first command
+  /// that names it.
+  void command(const LegCommand& command) noexcept;
+
+  /// Starts a joint motion now. Refused (false) when there is no such joint, a value is not a number
+  /// or the duration not positive.
+  bool moveRobot(const RobotMove& move) noexcept;
+
+  /// Time passes, up to and including the events at `until` [ns].
+  void advance(std::int64_t until) noexcept;
+
+  /// What the controller gets to see, taken now.
+  Sample sample() noexcept;
+
+  /// As of the last look at the mechanics; now, right after sample().
+  const Truth& truth() const noexcept { return truth_; }
+  std::int64_t time() const noexcept { return now_; }  // [ns]
+
+ private:
+  void moveActuators(std::int64_t to) noexcept;
+  void readTransducers() noexcept;
+  void look() noexcept;
+  JointState jointsNow() const noexcept;
+  void planRobotEvent() noexcept;
+  void startRobotEvents() noexcept;
+  Wrench sensorLoad() const noexcept;
+  LegMotion legOutputs(double dt) noexcept;
+
+  PlantConfig config_;
+  RobotModel carried_;  // the robot with all rigid plates counted into its base
+  Transform X_SL0_;
+  std::vector<LegSlave> slaves_;
+  std::vector<Actuator> actuators_;
+  LegCounts reference_{};
+  ForceTorqueSensor sensor_;
+  Butterworth2<kLegs> filter_position_;
+  Butterworth3<kLegs> filter_velocity_, filter_acceleration_;
+  ForceTorqueSensor::Step sensor_step_;  // for looks one update period apart
+  Butterworth2<kLegs>::Step position_step_;
+  Butterworth3<kLegs>::Step rate_step_;
+
+  std::int64_t now_ = 0;              // [ns] actuators are here
+  std::int64_t last_look_ = 0;        // [ns] mechanics and sensor are here
+  std::int64_t next_reading_ = kTransducerPeriod;  // [ns]
+  std::int64_t next_look_ = 0;        // [ns]
+  std::int64_t sequence_ = -1;
+  std::int64_t segment_ = -1;         // of the last command
+  std::int64_t segment_start_ = 0;    // [ns]
+  std::int64_t next_robot_event_ = kNever;  // [ns]
+  std::vector<bool> robot_event_done_;
+  struct JointPath {
+    std::int64_t start = 0;  // [ns]
+    Quintic<1> path;
+  };
+  std::array<JointPath, kMaxJoints> paths_;
+  Truth truth_;
+};
+
+}  // namespace ves::plant

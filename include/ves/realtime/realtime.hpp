@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+
+namespace ves {
+
+/// CLOCK_MONOTONIC: no clock step reaches it.
+std::int64_t monotonicNow() noexcept;  // [ns]
+
+/// An absolute schedule. A missed deadline is counted and skipped, never made up; the phase stays.
+class Ticker {
+ public:
+  explicit Ticker(std::int64_t period) noexcept : period_(period), next_(monotonicNow()) {}
+
+  /// Sleeps until the next deadline; returns how many were missed before it.
+  std::int64_t wait() noexcept;
+
+  std::int64_t late() const noexcept { return late_; }      // [ns] of the last waking
+  std::int64_t missed() const noexcept { return missed_; }  // [-] so far
+
+ private:
+  std::int64_t period_;  // [ns]
+  std::int64_t next_;    // [ns]
+  std::int64_t late_ = 0;
+  std::int64_t missed_ = 0;
+};
+
+/// Real-time conduct of this process: SCHED_FIFO at `priority`, memory locked. When `required`,
+/// throws InputError with the reason; otherwise says whether both were granted.
+bool claimRealtime(int priority, bool required);
+
+}  // namespace ves

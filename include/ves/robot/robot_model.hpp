@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// A serial robot as plain numbers: what gravity compensation and Newton-Euler read.
+#pragma once
+
+#include <array>
+
+#include "ves/math/frames.hpp"
+
+namespace ves {
+
+inline constexpr int kMaxJoints = 12;
+
+enum class JointType { kRevolute, kPrismatic };
+
+/// Mass, centre and inertia of a rigid body B.
+struct RigidBody {
+  double mass = 0.0;           // [kg]
+  Vec3 p_BoBcm_B = Vec3::Zero();  // [m] centre of mass
+  Mat3 I_Bcm_B = Mat3::Zero();    // [kg m^2] about the centre of mass
+};
+
+/// One body of both, expressed in A; B's frame is posed in A.
+RigidBody combine(const RigidBody& a_A, const Transform& X_AB, const RigidBody& b_B) noexcept;
+
+/// A joint and the link it moves. The link's frame is the joint's frame after the joint's motion.
+struct Link {
+  JointType type = JointType::kRevolute;
+  Transform X_parent;            // pose of the joint's frame in the parent link, at joint value 0
+  Vec3 axis = Vec3::UnitZ();     // [-] unit vector, joint frame
+  double lower = 0.0;            // [rad | m] joint range
+  double upper = 0.0;            // [rad | m]
+  RigidBody body;
+};
+
+/// Links 1..n on a fixed base link 0, whose frame is L0.
+struct RobotModel {
+  RigidBody base;  // link 0
+  int joints = 0;  // [-]
+  std::array<Link, kMaxJoints> links{};
+
+  const Link& link(int i) const { return links[static_cast<std::size_t>(i)]; }
+};
+
+/// Joint values; entries from `joints` on are zero.
+using JointVector = Eigen::Matrix<double, kMaxJoints, 1>;
+
+struct JointState {
+  JointVector q = JointVector::Zero();       // [rad | m]
+  JointVector q_dot = JointVector::Zero();   // [rad/s | m/s]
+  JointVector q_ddot = JointVector::Zero();  // [rad/s^2 | m/s^2]
+};
+
+/// Pose of link i's frame in its parent's, for joint value q.
+Transform linkPose(const Link& link, double q) noexcept;
+
+}  // namespace ves

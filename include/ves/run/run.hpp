@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Ways to run an experiment: both halves in one process in lockstep, or each half as a process of
+// its own over the bus, in lockstep or in real time.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "ves/config/experiment.hpp"
+#include "ves/transport/bus.hpp"
+#include "ves/transport/event_log.hpp"
+
+namespace ves {
+
+/// How a run ended.
+struct RunResult {
+  std::int64_t ticks = 0;       // [-]
+  double simulated = 0.0;       // [s]
+  double wall = 0.0;            // [s]
+  Phase phase = Phase::kDisarmed;
+  Check cause = Check::kCount;  // of a stop; or why it never armed
+  std::int64_t cause_tick = -1;
+
+  bool good() const { return phase == Phase::kParked; }
+};
+
+/// Called after every tick; may ask for the program's end.
+using Watch = std::function<Request(const TickState&)>;
+
+inline constexpr const char* kVersion = "0.1.0";
+
+experiment_t describe(const Experiment& experiment, const Identity& from, std::int64_t time);
+
+/// The experiment in one process without a bus, as fast as it goes; bit-identical for one seed.
+RunResult runLockstep(const Experiment& experiment, LogWriter* log, const Watch& watch);
+
+struct ProcessOptions {
+  std::string url = kDefaultUrl;
+  bool lockstep = false;
+  bool realtime = false;  // insist on SCHED_FIFO and locked memory
+  std::string log;        // file, empty: none
+};
+
+/// The controller's process. Returns when the program is over, a check has stopped it, or the machine
+/// is silent.
+RunResult runController(const Experiment& experiment, const ProcessOptions& options,
+                        const Watch& watch);
+
+/// The plant's process. Returns when `stop` becomes true.
+void runPlant(const Experiment& experiment, const ProcessOptions& options,
+              const std::function<bool()>& stop);
+
+struct LaunchOptions {
+  ProcessOptions process;
+  std::filesystem::path programs;   // folder of ves-controller and ves-plant
+  std::filesystem::path scenario;   // resolved experiment file, for both
+};
+
+/// Both as processes; records everything on the bus to options.process.log. `watch` sees the states
+/// that pass.
+RunResult runProcesses(const Experiment& experiment, const LaunchOptions& options,
+                       const std::function<void(const state_t&)>& watch,
+                       const std::function<bool()>& stop);
+
+}  // namespace ves

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// LCM, behind one small door. Handlers store and count; they never act, throw or log.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <lcm/lcm-cpp.hpp>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "ves/transport/messages.hpp"
+
+namespace ves {
+
+inline constexpr const char* kDefaultUrl = "udpm://239.255.76.67:7667?ttl=0";
+
+class Bus {
+ public:
+  /// Opens the bus and proves that a message comes back. Throws InputError with the remedy.
+  explicit Bus(const std::string& url);
+
+  /// Encodes on the stack: no heap.
+  template <typename Message>
+  void publish(const std::string& channel, const Message& message) noexcept {
+    std::array<std::uint8_t, 4096> buffer;
+    const int size = message.encode(buffer.data(), 0, static_cast<int>(buffer.size()));
+    if (size < 0 || lcm_.publish(channel, buffer.data(), static_cast<unsigned>(size)) != 0)
+      ++failed_;
+  }
+  /// For the one message that has no fixed size.
+  void publish(const std::string& channel, const experiment_t& message);
+
+  /// Every message of a channel (a regular expression), as bytes.
+  using Handler = std::function<void(const std::string& channel, const void* data, std::uint32_t size)>;
+  void subscribe(const std::string& channel, Handler handler);
+
+  /// Hands out all that has arrived.
+  void drain() noexcept;
+  /// Waits for one message; false when none came in time.
+  bool wait(int milliseconds) noexcept;
+
+  std::int64_t failed() const noexcept { return failed_; }  // [-] messages not sent
+
+ private:
+  struct Subscriber {
+    Handler handler;
+    void receive(const lcm::ReceiveBuffer* buffer, const std::string& channel) {
+      handler(channel, buffer->data, buffer->data_size);
+    }
+  };
+
+  lcm::LCM lcm_;
+  std::vector<std::unique_ptr<Subscriber>> subscribers_;
+  std::int64_t failed_ = 0;
+};
+
+/// True when multicast messages of this machine reach this machine.
+bool busWorks(const std::string& url);
+
+/// Moves this process (and what it starts) to a network of its own, where loopback carries
+/// multicast: nothing leaks out or in. Call before any thread starts. Throws InputError.
+void enterPrivateBus();
+
+/// The controller's side: the newest sample, the operator's wish, whether somebody else commands.
+class ControllerLink {
+ public:
+  ControllerLink(Bus& bus, const Identity& self);
+
+  const Sample& sample() const noexcept { return sample_; }
+  std::int64_t answers() const noexcept { return answers_; }  // lockstep: tick the sample answers
+  std::int64_t sampleTime() const noexcept { return sample_time_; }  // [ns] sender's clock
+  Request takeRequest() noexcept { return std::exchange(request_, Request::kNone); }
+  bool takeRival() noexcept { return std::exchange(rival_, false); }
+  std::int64_t rejected() const noexcept { return rejected_; }  // [-] messages not let in
+
+  void send(const leg_command_t& command) noexcept;
+
+ private:
+  Bus& bus_;
+  Identity self_;
+  Sample sample_;
+  std::int64_t answers_ = -2;
+  std::int64_t sample_time_ = 0;
+  Identity plant_;
+  Request request_ = Request::kNone;
+  bool rival_ = false;
+  std::int64_t rejected_ = 0;
+};
+
+/// The machine's side: the newest command of the one controller that has the legs.
+class PlantLink {
+ public:
+  /// A controller keeps the legs until it lets go or is silent for so long.
+  static constexpr std::int64_t kSilence = 500'000'000;  // [ns]
+
+  explicit PlantLink(Bus& bus);
+
+  /// The plant's clock, by which silence counts.
+  void setTime(std::int64_t now) noexcept { now_ = now; }
+
+  /// The newest command since the last call; its sequence is the controller's tick.
+  std::optional<std::pair<LegCommand, std::int64_t>> takeCommand() noexcept {
+    return std::exchange(command_, std::nullopt);
+  }
+  std::vector<plant::RobotMove> takeMoves() { return std::exchange(moves_, {}); }
+  std::int64_t rejected() const noexcept { return rejected_; }
+
+ private:
+  bool mayCommand(const header_t& from, bool engaged) noexcept;
+
+  std::int64_t now_ = 0;          // [ns]
+  Identity master_;               // who has the legs
+  bool engaged_ = false;
+  std::int64_t heard_ = 0;        // [ns]
+  std::int64_t sequence_ = -2;    // of the master's last command
+  std::optional<std::pair<LegCommand, std::int64_t>> command_;
+  std::vector<plant::RobotMove> moves_;
+  std::int64_t rejected_ = 0;
+};
+
+}  // namespace ves

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+
+namespace ves::channel {
+
+// At most 15 characters: such a string needs no heap.
+inline const std::string kSample = "VES_SAMPLE";
+inline const std::string kLegCommand = "VES_LEG_COMMAND";
+inline const std::string kState = "VES_STATE";
+inline const std::string kTruth = "VES_TRUTH";
+inline const std::string kTiming = "VES_TIMING";
+inline const std::string kRobot = "VES_ROBOT";
+inline const std::string kOperator = "VES_OPERATOR";
+inline const std::string kExperiment = "VES_EXPERIMENT";
+
+}  // namespace ves::channel

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Between messages and the structs of the control path. What comes from the wire passes a gate: every
+// value finite and in range, or the message is nobody's.
+#pragma once
+
+#include <optional>
+#include <ves/experiment_t.hpp>
+#include <ves/leg_command_t.hpp>
+#include <ves/operator_t.hpp>
+#include <ves/robot_command_t.hpp>
+#include <ves/sample_t.hpp>
+#include <ves/state_t.hpp>
+#include <ves/timing_t.hpp>
+#include <ves/truth_t.hpp>
+
+#include "ves/control/test_platform.hpp"
+#include "ves/plant/plant.hpp"
+
+namespace ves {
+
+/// Who sends, and since when.
+struct Identity {
+  std::int64_t source = 0;
+  std::int64_t epoch = 0;
+
+  /// A fresh one for this process.
+  static Identity draw();
+};
+
+header_t header(const Identity& from, std::int64_t sequence, std::int64_t time) noexcept;
+
+sample_t toMessage(const Sample& sample, const Identity& from, std::int64_t answers) noexcept;
+leg_command_t toMessage(const LegCommand& command, const header_t& header) noexcept;
+state_t toMessage(const TickState& state, const TickInput& in, const header_t& header) noexcept;
+truth_t toMessage(const plant::Truth& truth, const header_t& header) noexcept;
+
+/// Nothing when a value is out of range or not a number.
+std::optional<Sample> fromMessage(const sample_t& message) noexcept;
+std::optional<LegCommand> fromMessage(const leg_command_t& message) noexcept;
+std::optional<plant::RobotMove> fromMessage(const robot_command_t& message) noexcept;
+std::optional<Request> fromMessage(const operator_t& message) noexcept;
+
+/// Decodes bytes of one message; nothing when they are not exactly that.
+template <typename Message>
+std::optional<Message> decode(const void* data, std::int64_t size) {
+  Message message;
+  if (size < 0 || size > INT32_MAX) return {};
+  if (message.decode(data, 0, static_cast<int>(size)) != size) return {};
+  return message;
+}
+
+}  // namespace ves

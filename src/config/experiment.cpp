@@ -1,0 +1,442 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/config/experiment.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "ves/config/modes.hpp"
+#include "ves/config/urdf.hpp"
+
+namespace ves {
+namespace {
+
+constexpr double kAny = HUGE_VAL;
+constexpr double kTiny = 1e-12;  // least positive value that is taken
+
+constexpr std::string_view kCoordinates[] = {"x", "y", "z", "alpha", "beta", "gamma"};
+
+/// A length in metres, or an angle in degrees, by coordinate.
+double readCoordinate(Section& s, const std::string& key, int i) {
+  return i < 3 ? s.number(key + "_m", -kAny, kAny) : s.number(key + "_deg", -kAny, kAny) * kDegree;
+}
+
+Pose readPose(Section s) {
+  Vec6 x = Vec6::Zero();
+  for (int i = 0; i < 6; ++i) {
+    const std::string key = std::string(kCoordinates[i]) + (i < 3 ? "_m" : "_deg");
+    if (s.has(key)) x(i) = readCoordinate(s, std::string(kCoordinates[i]), i);
+  }
+  s.finish();
+  return Pose::from(x);
+}
+
+Geometry readGeometry(Section s) {
+  Geometry g;
+  const auto joints = [&](const char* key) {
+    const Eigen::MatrixXd xy = s.matrix(key, kLegs, 2, -10.0, 10.0);
+    std::array<Vec3, kLegs> out;
+    for (int i = 0; i < kLegs; ++i) out[static_cast<std::size_t>(i)] = {xy(i, 0), xy(i, 1), 0.0};
+    return out;
+  };
+  g.p_IBi_I = joints("base_joints_m");
+  g.p_PPi_P = joints("platform_joints_m");
+  g.home_height = s.number("home_height_m", 0.01, 10.0);
+  s.finish();
+  const BodyMotion home{g.fromHome({}), {}, {}, {}, {}};
+  BodyMotion solved;
+  if (!forwardMotion(g, home.X, {legLengths(g, home.X), Vec6::Zero(), Vec6::Zero()}, solved))
+    s.fail("platform_joints_m", "the platform is singular at home: its legs cannot hold it");
+  return g;
+}
+
+/// A uniform box; its centre is at the frame's origin unless `center_m` says otherwise.
+RigidBody readBox(Section s) {
+  RigidBody box;
+  box.mass = s.number("mass_kg", 0.0, 1e5);
+  const Vec3 size = s.vector("size_m", 3, 0.0, 10.0);
+  if (s.has("center_m")) box.p_BoBcm_B = s.vector("center_m", 3, -10.0, 10.0);
+  const Vec3 q = size.cwiseAbs2();
+  box.I_Bcm_B =
+      (box.mass / 12.0 * Vec3(q.y() + q.z(), q.x() + q.z(), q.x() + q.y())).asDiagonal();
+  s.finish();
+  return box;
+}
+
+struct Legs {
+  plant::LegSlaveGains gains;
+  plant::ActuatorModel actuator;
+  plant::Temposonics transducer;
+  plant::LegFilters filters = plant::LegFilters::kNone;
+  double filter_cutoff = 0.0;
+  LegCodec codec;
+};
+
+Legs readLegs(Section s) {
+  Legs legs;
+  legs.gains.K_P = static_cast<int>(s.integer("K_P", 0, 1'000'000));
+  legs.gains.K_D = static_cast<int>(s.integer("K_D", 0, 1'000'000));
+  constexpr double kPerMilliampere = 1e3;
+  legs.actuator.gain_extend =
+      s.number("gain_extend_in_per_s_per_ma", kTiny, 1e3) * kMetrePerInch * kPerMilliampere;
+  legs.actuator.gain_retract =
+      s.number("gain_retract_in_per_s_per_ma", kTiny, 1e3) * kMetrePerInch * kPerMilliampere;
+  legs.actuator.tau = s.number("tau_s", 1e-6, 1.0);
+  legs.actuator.length_min = s.number("stroke_min_m", 0.0, 10.0);
+  legs.actuator.length_max = s.number("stroke_max_m", legs.actuator.length_min, 10.0);
+  legs.transducer.offset = s.number("offset_m", 0.0, 10.0);
+  legs.transducer.scale = kMetrePerInch / s.number("counts_per_in", 1.0, 1e6);
+  const double reach = legs.transducer.offset + legs.transducer.scale * plant::Temposonics::kMaxCount;
+  if (legs.actuator.length_min < legs.transducer.offset || legs.actuator.length_max > reach)
+    s.fail("offset_m", fmt::format("the 14-bit transducer sees {:.4f} to {:.4f} m, the stroke is {} "
+                                   "to {} m; want the stroke inside",
+                                   legs.transducer.offset, reach, legs.actuator.length_min,
+                                   legs.actuator.length_max));
+  legs.filters = s.choice("filters", {"none", "outputs"}) == "none" ? plant::LegFilters::kNone
+                                                                     : plant::LegFilters::kOutputs;
+  legs.filter_cutoff = s.number("filter_cutoff_rad_per_s", 1e-3, 1e6);
+  s.finish();
+  legs.codec.offset.setConstant(legs.transducer.offset);
+  legs.codec.scale.setConstant(legs.transducer.scale);
+  return legs;
+}
+
+struct Sensor {
+  plant::ForceTorqueSensorModel model;
+  Transform X_PS;
+  RigidBody top_plate_S;
+};
+
+Sensor readSensor(Section s) {
+  Sensor out;
+  plant::ForceTorqueSensorModel& m = out.model;
+  constexpr double kMicro = 1e-6;
+  m.S = s.matrix("sensitivity_uv_per_v", 6, 6, -1e6, 1e6) * kMicro;
+  m.excitation = s.number("excitation_v", kTiny, 100.0);
+  m.gain = s.vector("gain", 6, 1.0, 5000.0);
+  m.bias = s.vector("bias_v", 6, -10.0, 10.0);
+  m.noise = s.vector("noise_v_per_root_hz", 6, 0.0, 1.0);
+  if (!s.flag("noise")) m.noise.setZero();
+  m.cutoff = 2.0 * M_PI * s.number("cutoff_hz", 1e-3, 1e5);
+  m.volts_per_count = s.number("volts_per_count", kTiny, 1.0);
+  m.pressure = s.number("pressure_v", -10.0, 10.0);
+  if (!(std::abs(m.S_proc().determinant()) > 0.0) || !m.S_proc().inverse().allFinite())
+    s.fail("sensitivity_uv_per_v", "is singular, want a matrix that has an inverse");
+  out.X_PS = {Vec3(1.0, -1.0, -1.0).asDiagonal().toDenseMatrix(),  // 180 degrees about x
+              s.vector("position_m", 3, -10.0, 10.0)};
+  out.top_plate_S = readBox(s.section("top_plate"));
+  s.finish();
+  return out;
+}
+
+SafetyLimits readSafety(Section s) {
+  SafetyLimits l;
+  l.leg_velocity = s.number("leg_velocity_m_per_s", kTiny, 10.0);
+  l.position_error = s.number("position_error_m", kTiny, 10.0);
+  l.translation = s.number("translation_m", kTiny, 10.0);
+  l.rotation = s.number("rotation_deg", kTiny, 85.0) * kDegree;
+  l.leg_min = s.number("leg_min_m", kTiny, 10.0);
+  l.leg_max = s.number("leg_max_m", l.leg_min, 10.0);
+  l.joint_cone = s.number("joint_cone_deg", kTiny, 180.0) * kDegree;
+  l.leg_clearance = s.number("leg_clearance_m", 0.0, 1.0);
+  constexpr double kSquareCentimetre = 1e-4, kLitre = 1e-3;
+  l.bore_area = s.number("bore_area_cm2", kTiny, 1e4) * kSquareCentimetre;
+  l.rod_side_area = s.number("rod_side_area_cm2", kTiny, 1e4) * kSquareCentimetre;
+  l.flow = s.number("flow_l_per_s", kTiny, 1e3) * kLitre;
+  l.stale_ticks = static_cast<int>(s.integer("stale_ticks", 0, 1000));
+  s.finish();
+  return l;
+}
+
+/// A 6x6 given by its rows or, when only it is not zero, by its diagonal.
+Mat6 readMatrix(Section& s, std::string_view key, bool semidefinite) {
+  Mat6 A;
+  if (s.has(std::string(key) + "_diagonal"))
+    A = s.vector(std::string(key) + "_diagonal", 6, -kAny, kAny).asDiagonal();
+  else
+    A = s.matrix(key, 6, 6, -kAny, kAny);
+  const std::string fault = definitenessFault(A, semidefinite);
+  if (!fault.empty())
+    s.fail(s.has(std::string(key) + "_diagonal") ? std::string(key) + "_diagonal" : std::string(key),
+           fault);
+  return A;
+}
+
+ModalModel readBase(Section s) {
+  if (!s.has("modes")) {
+    const Mat6 M = readMatrix(s, "mass", false);
+    const Mat6 C = readMatrix(s, "damping", true);
+    const Mat6 K = readMatrix(s, "stiffness", true);
+    s.finish();
+    return modesOf(M, C, K);
+  }
+  Section modes = s.section("modes");
+  const Eigen::VectorXd omega =
+      2.0 * M_PI * modes.vector("frequency_hz", -1, 0.0, 1e4);
+  const auto k = static_cast<int>(omega.size());
+  if (k > kMaxModes)
+    modes.fail("frequency_hz", fmt::format("{} modes, want at most {}", k, kMaxModes));
+  const Eigen::VectorXd zeta = modes.vector("damping_ratio", k, 0.0, 1e3);
+  ModalModel out;
+  out.Phi = modes.matrix("shapes", 6, k, -kAny, kAny);
+  out.stiffness = omega.cwiseAbs2();
+  out.damping = (2.0 * zeta.cwiseProduct(omega)).asDiagonal();
+  modes.finish();
+  s.finish();
+  return out;
+}
+
+struct Robot {
+  UrdfRobot urdf;
+  Transform X_PR, X_RL0;
+  RigidBody adapter_R;
+  JointVector q = JointVector::Zero();
+};
+
+double jointUnit(const Link& link) { return link.type == JointType::kRevolute ? kDegree : 1.0; }
+
+void requireInLimits(const Section& s, std::string_view key, const UrdfRobot& robot, int joint,
+                     double q) {
+  const Link& link = robot.model.link(joint);
+  if (!(q >= link.lower - 1e-9 && q <= link.upper + 1e-9))
+    s.fail(key, fmt::format("joint '{}' at {:.6g}, want [{:.6g}, {:.6g}] {}",
+                            robot.joint_names[static_cast<std::size_t>(joint)], q / jointUnit(link),
+                            link.lower / jointUnit(link), link.upper / jointUnit(link),
+                            link.type == JointType::kRevolute ? "deg" : "m"));
+}
+
+Robot readRobot(Section s, const Value& document) {
+  Robot robot;
+  const Value* text = document.find("robot")->find("urdf_text");
+  robot.urdf = loadUrdf(s.text("urdf_text"), *text->file);
+  robot.X_PR = {Mat3::Identity(), s.vector("adapter_position_m", 3, -10.0, 10.0)};
+  robot.adapter_R = readBox(s.section("adapter"));
+  robot.X_RL0 = {rotation(s.vector("mount_rpy_deg", 3, -360.0, 360.0) * kDegree),
+                 s.vector("mount_m", 3, -10.0, 10.0)};
+  const Eigen::VectorXd q = s.vector("joints_deg_or_m", robot.urdf.model.joints, -1e6, 1e6);
+  for (int i = 0; i < robot.urdf.model.joints; ++i) {
+    robot.q(i) = q(i) * jointUnit(robot.urdf.model.link(i));
+    requireInLimits(s, "joints_deg_or_m", robot.urdf, i, robot.q(i));
+  }
+  s.finish();
+  return robot;
+}
+
+/// Nanoseconds from seconds, to the nearest.
+std::int64_t readTime(Section& s, std::string_view key) {
+  return std::llround(s.number(key, 0.0, 1e6) * 1e9);
+}
+
+class ProgramReader {
+ public:
+  ProgramReader(const UrdfRobot* robot, Experiment& out) : robot_(robot), out_(out) {}
+
+  void read(Section& root) {
+    const std::vector<Section> items = root.list("program");
+    if (items.empty() || items.size() > kMaxSegments)
+      root.fail("program", fmt::format("has {} segments, want 1 to {}", items.size(), kMaxSegments));
+    for (Section item : items) {
+      Segment& segment = out_.controller.program.segments[static_cast<std::size_t>(
+          out_.controller.program.size)];
+      readSegment(item, segment);
+      if (item.has("robot"))
+        for (Section event : item.list("robot")) readRobotEvent(event);
+      if (item.has("switches"))
+        for (Section event : item.list("switches")) readSwitchEvent(event);
+      item.finish();
+      ++out_.controller.program.size;
+    }
+  }
+
+ private:
+  void readSegment(Section& item, Segment& segment) {
+    const std::string kind = item.onlyKey({"calibration", "move", "trajectory", "admittance"},
+                                          {"robot", "switches"});
+    Section s = item.section(kind);
+    if (kind == "calibration") {
+      segment.kind = SegmentKind::kCalibration;
+    } else if (kind == "move") {
+      segment.kind = SegmentKind::kMove;
+      if (s.has("duration_s")) segment.duration = s.number("duration_s", 0.1, 1e5);
+      if (s.has("to")) segment.target = readPose(s.section("to"));
+    } else if (kind == "trajectory") {
+      segment.kind = SegmentKind::kTrajectory;
+      segment.duration = s.number("duration_s", 0.01, 1e6);
+      for (int i = 0; i < 6; ++i) {
+        const std::string coordinate(kCoordinates[i]);
+        if (s.has(coordinate))
+          segment.trajectory[static_cast<std::size_t>(i)] = readAxis(s.section(coordinate), i);
+      }
+    } else {
+      segment.kind = SegmentKind::kAdmittance;
+      segment.duration = s.number("duration_s", 0.01, 1e6);
+    }
+    s.finish();
+  }
+
+  static Axis readAxis(Section s, int i) {
+    Axis axis;
+    const std::string kind = s.onlyKey({"ramp", "sine"}, {});
+    Section motion = s.section(kind);
+    if (kind == "ramp") {
+      axis.motion = AxisMotion::kRamp;
+      axis.final = readCoordinate(motion, "to", i);
+    } else {
+      axis.motion = AxisMotion::kSine;
+      axis.amplitude = readCoordinate(motion, "amplitude", i);
+      axis.frequency = motion.number("frequency_hz", 0.0, 1e3);
+    }
+    motion.finish();
+    s.finish();
+    return axis;
+  }
+
+  void readRobotEvent(Section& s) {
+    plant::RobotEvent event;
+    event.cue = {out_.controller.program.size, readTime(s, "at_s")};
+    event.move.duration = s.number("duration_s", 1e-3, 1e5);
+    const std::string joint = s.text("joint");
+    if (!robot_) s.fail("joint", fmt::format("'{}', but there is no robot", joint));
+    const auto at = std::find(robot_->joint_names.begin(), robot_->joint_names.end(), joint);
+    if (at == robot_->joint_names.end())
+      s.fail("joint", fmt::format("'{}', want one of {}", joint, fmt::join(robot_->joint_names, ", ")));
+    event.move.joint = static_cast<int>(at - robot_->joint_names.begin());
+    event.move.target =
+        s.number("to_deg_or_m", -1e6, 1e6) * jointUnit(robot_->model.link(event.move.joint));
+    requireInLimits(s, "to_deg_or_m", *robot_, event.move.joint, event.move.target);
+    s.finish();
+    out_.plant.robot_events.push_back(event);
+  }
+
+  void readSwitchEvent(Section& s) {
+    plant::SwitchEvent event;
+    event.cue = {out_.controller.program.size, readTime(s, "at_s")};
+    event.duration = readTime(s, "duration_s");
+    event.switches = s.choice("switch", {"panic_button", "floor_mat"}) == "panic_button"
+                         ? kPanicButtonClosed
+                         : kFloorMatClosed;
+    s.finish();
+    out_.plant.switch_events.push_back(event);
+  }
+
+  const UrdfRobot* robot_;
+  Experiment& out_;
+};
+
+int countSubstitutes(const Value& value, bool inherited) {
+  const bool substitute = value.tag.empty() ? inherited : value.tag == "substitute";
+  if (value.kind == Value::Kind::kScalar) return substitute ? 1 : 0;
+  int count = 0;
+  for (const Value& child : value.children) count += countSubstitutes(child, substitute);
+  return count;
+}
+
+/// FNV-1a, 64 bits: tells configurations apart, no more.
+std::string fingerprint(const std::string& text) {
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  for (const unsigned char c : text) hash = (hash ^ c) * 0x100000001b3u;
+  return fmt::format("{:016x}", hash);
+}
+
+Experiment build(const Value& document) {
+  Experiment out;
+  Section root(document, "");
+  root.integer("schema", 1, 1);
+  out.name = root.text("name");
+  out.description = root.text("description");
+  out.plant.seed = static_cast<std::uint32_t>(root.integer("seed", 0, UINT32_MAX));
+
+  ControllerConfig& c = out.controller;
+  plant::PlantConfig& p = out.plant;
+  c.gravity = Vec3(0.0, 0.0, -root.number("gravity_m_per_s2", 0.0, 100.0));
+
+  Section controller = root.section("controller");
+  c.period = controller.integer("period_ns", 1'000'000, 1'000'000'000);
+  c.gentle_speed = controller.number("gentle_speed_m_per_s", 1e-3, 1.0);
+  c.gentle_rotation = controller.number("gentle_rotation_deg_per_s", 1e-1, 100.0) * kDegree;
+  c.arming_samples = static_cast<int>(controller.integer("arming_samples", 1, 10'000));
+  controller.finish();
+
+  c.geometry = readGeometry(root.section("platform"));
+  const Legs legs = readLegs(root.section("legs"));
+  c.legs = legs.codec;
+  const Sensor sensor = readSensor(root.section("sensor"));
+  c.sensor = {sensor.model.S_proc().inverse(), sensor.X_PS};
+  c.safety = readSafety(root.section("safety"));
+  c.admittance = readBase(root.section("base"));
+
+  c.payload.X_PS = sensor.X_PS;
+  c.payload.top_plate_S = sensor.top_plate_S;
+  c.payload.X_PR.p = sensor.X_PS.p;
+  UrdfRobot urdf;
+  const bool has_robot = root.has("robot");
+  if (has_robot) {
+    const Robot robot = readRobot(root.section("robot"), document);
+    urdf = robot.urdf;
+    c.payload.X_PR = robot.X_PR;
+    c.payload.adapter_R = robot.adapter_R;
+    c.payload.X_RL0 = robot.X_RL0;
+    c.payload.robot = urdf.model;
+    p.initial_joints = robot.q;
+    out.joint_names = urdf.joint_names;
+    out.warnings = urdf.warnings;
+  }
+
+  p.geometry = c.geometry;
+  p.initial_pose = readPose(root.section("initial_pose"));
+  p.leg_slave = legs.gains;
+  p.actuator = legs.actuator;
+  p.transducer = legs.transducer;
+  p.filters = legs.filters;
+  p.filter_cutoff = legs.filter_cutoff;
+  p.sensor = sensor.model;
+  p.payload = c.payload;
+  p.gravity = c.gravity;
+  const Vec6 L = legLengths(p.geometry, p.geometry.fromHome(p.initial_pose));
+  if (L.minCoeff() < p.actuator.length_min || L.maxCoeff() > p.actuator.length_max)
+    root.fail("initial_pose",
+              fmt::format("takes legs of {:.4f} to {:.4f} m, want the stroke of {} to {} m",
+                          L.minCoeff(), L.maxCoeff(), p.actuator.length_min,
+                          p.actuator.length_max));
+
+  ProgramReader(has_robot ? &urdf : nullptr, out).read(root);
+  root.finish();
+  out.substitutes = countSubstitutes(document, false);
+  out.resolved = emit(document);
+  out.hash = fingerprint(out.resolved);
+  return out;
+}
+
+}  // namespace
+
+Experiment loadExperiment(const std::filesystem::path& file,
+                          const std::vector<std::string>& overrides) {
+  Value document = loadDocument(file);
+  for (const std::string& assignment : overrides) override(document, assignment);
+  return build(document);
+}
+
+Experiment parseExperiment(const std::string& resolved, const std::string& name) {
+  return build(parseDocument(resolved, name));
+}
+
+std::filesystem::path findScenario(const std::string& scenario,
+                                   const std::filesystem::path& config) {
+  const std::filesystem::path given(scenario);
+  if (given.extension() == ".yaml") return given;
+  const std::filesystem::path folder = config / "scenarios";
+  const std::filesystem::path named = folder / (scenario + ".yaml");
+  std::error_code error;
+  if (!scenario.empty() && std::filesystem::exists(named, error)) return named;
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error))
+    if (entry.path().extension() == ".yaml") names.push_back(entry.path().stem().string());
+  std::sort(names.begin(), names.end());
+  throw InputError(fmt::format("scenario '{}': unknown, want one of {} or a path to a .yaml file",
+                               scenario, fmt::join(names, ", ")));
+}
+
+}  // namespace ves

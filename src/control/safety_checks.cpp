@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/control/safety_checks.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ves {
+
+std::string_view name(Check check) noexcept {
+  switch (check) {
+    case Check::kPanicButton: return "panic button";
+    case Check::kFloorMat: return "floor mat";
+    case Check::kFinite: return "finite numbers";
+    case Check::kStale: return "sample age";
+    case Check::kForwardKinematics: return "forward kinematics";
+    case Check::kPositionError: return "position error";
+    case Check::kMotionLimits: return "motion limits";
+    case Check::kActuatorLimits: return "actuator limits";
+    case Check::kJointLimits: return "joint limits";
+    case Check::kCollide: return "collide";
+    case Check::kVelocity: return "velocity";
+    case Check::kFlow: return "flow limits";
+    case Check::kRival: return "second controller";
+    case Check::kCount: break;
+  }
+  return "none";
+}
+
+Check Tripped::first() const noexcept {
+  std::uint32_t i = 0;
+  while (i < static_cast<std::uint32_t>(Check::kCount) && !has(static_cast<Check>(i))) ++i;
+  return static_cast<Check>(i);
+}
+
+bool velocityCheck(const SafetyLimits& limits, const Vec6& L, const Vec6& L_last,
+                   double period) noexcept {
+  return (L - L_last).cwiseAbs().maxCoeff<Eigen::PropagateNaN>() <= limits.leg_velocity * period;
+}
+
+bool positionErrorCheck(const SafetyLimits& limits, const Vec6& L_commanded,
+                        const Vec6& L_measured) noexcept {
+  return (L_commanded - L_measured).cwiseAbs().maxCoeff<Eigen::PropagateNaN>() <=
+         limits.position_error;
+}
+
+double segmentDistance(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) noexcept {
+  // Minimise |a + s u - c - t v| over the unit square: the unconstrained foot, then clamped.
+  const Vec3 u = b - a, v = d - c, w = a - c;
+  const double uu = u.squaredNorm(), vv = v.squaredNorm();
+  const double uv = u.dot(v), uw = u.dot(w), vw = v.dot(w);
+  const double det = uu * vv - uv * uv;
+  double s = det > 1e-12 * uu * vv ? std::clamp((uv * vw - vv * uw) / det, 0.0, 1.0) : 0.0;
+  double t = (uv * s + vw) / vv;
+  if (t < 0.0 || t > 1.0) {
+    t = std::clamp(t, 0.0, 1.0);
+    s = std::clamp((uv * t - uw) / uu, 0.0, 1.0);
+  }
+  return (w + s * u - t * v).norm();
+}
+
+bool collideCheck(const SafetyLimits& limits, const Geometry& geometry,
+                  const Transform& X_IP) noexcept {
+  std::array<Vec3, kLegs> p_IPi_I;
+  for (std::size_t i = 0; i < kLegs; ++i) p_IPi_I[i] = X_IP * geometry.p_PPi_P[i];
+  bool clear = true;
+  for (std::size_t i = 0; i < kLegs; ++i)
+    for (std::size_t j = i + 1; j < kLegs; ++j)
+      clear = clear && segmentDistance(geometry.p_IBi_I[i], p_IPi_I[i], geometry.p_IBi_I[j],
+                                       p_IPi_I[j]) >= limits.leg_clearance;
+  return clear;
+}
+
+bool motionLimitsCheck(const SafetyLimits& limits, const Pose& x) noexcept {
+  return x.p.cwiseAbs().maxCoeff<Eigen::PropagateNaN>() <= limits.translation &&
+         x.rpy.cwiseAbs().maxCoeff<Eigen::PropagateNaN>() <= limits.rotation;
+}
+
+bool actuatorLimitsCheck(const SafetyLimits& limits, const Vec6& L) noexcept {
+  return L.minCoeff<Eigen::PropagateNaN>() >= limits.leg_min &&
+         L.maxCoeff<Eigen::PropagateNaN>() <= limits.leg_max;
+}
+
+bool flowLimitsCheck(const SafetyLimits& limits, const Vec6& L, const Vec6& L_last,
+                     double period) noexcept {
+  bool available = true;
+  for (int i = 0; i < kLegs; ++i) {
+    const double rate = (L(i) - L_last(i)) / period;
+    const double flow = std::abs(rate) * (rate > 0.0 ? limits.bore_area : limits.rod_side_area);
+    available = available && flow <= limits.flow;
+  }
+  return available;
+}
+
+JointAxes::JointAxes(const Geometry& geometry) noexcept {
+  const Transform home = geometry.fromHome({});
+  for (std::size_t i = 0; i < kLegs; ++i) {
+    base_I_[i] = (home * geometry.p_PPi_P[i] - geometry.p_IBi_I[i]).normalized();
+    platform_P_[i] = home.R.transpose() * base_I_[i];
+  }
+}
+
+bool JointAxes::check(const SafetyLimits& limits, const Geometry& geometry,
+                      const Transform& X_IP) const noexcept {
+  const double least = std::cos(limits.joint_cone);
+  bool inside = true;
+  for (std::size_t i = 0; i < kLegs; ++i) {
+    const Vec3 along = (X_IP * geometry.p_PPi_P[i] - geometry.p_IBi_I[i]).normalized();
+    inside = inside && along.dot(base_I_[i]) >= least &&
+             along.dot(X_IP.R * platform_P_[i]) >= least;
+  }
+  return inside;
+}
+
+}  // namespace ves

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/kinematics/stewart.hpp"
+
+#include <Eigen/LU>
+#include <cmath>
+
+namespace ves {
+namespace {
+
+/// Vectors of one leg in inertial axes.
+struct Leg {
+  Vec3 d;  // [m] Bi to Pi
+  Vec3 r;  // [m] Po to Pi
+};
+
+Leg leg(const Geometry& g, const Transform& X_IP, int i) {
+  const auto k = static_cast<std::size_t>(i);
+  const Vec3 r = X_IP.R * g.p_PPi_P[k];
+  return {X_IP.p + r - g.p_IBi_I[k], r};
+}
+
+/// Row i maps the twist {v_IPo_I, w_IP_I} to L_i dL_i/dt.
+Mat6 halfJacobian(const Geometry& g, const Transform& X_IP) {
+  Mat6 J;
+  for (int i = 0; i < kLegs; ++i) {
+    const Leg l = leg(g, X_IP, i);
+    J.row(i) << l.d.transpose(), l.r.cross(l.d).transpose();
+  }
+  return J;
+}
+
+/// False for a matrix that is singular to working precision, or not a number.
+bool regular(const Eigen::PartialPivLU<Mat6>& lu) {
+  const Vec6 pivots = lu.matrixLU().diagonal().cwiseAbs();
+  return pivots.minCoeff<Eigen::PropagateNaN>() > 1e-12 * pivots.maxCoeff<Eigen::PropagateNaN>();
+}
+
+}  // namespace
+
+Vec6 legLengths(const Geometry& geometry, const Transform& X_IP) noexcept {
+  Vec6 L;
+  for (int i = 0; i < kLegs; ++i) L(i) = leg(geometry, X_IP, i).d.norm();
+  return L;
+}
+
+LegMotion legMotion(const Geometry& geometry, const BodyMotion& P) noexcept {
+  LegMotion out;
+  for (int i = 0; i < kLegs; ++i) {
+    const Leg l = leg(geometry, P.X, i);
+    const Vec3 v = P.v + P.w.cross(l.r);                                        // v_Pi
+    const Vec3 a = P.a + P.alpha.cross(l.r) + P.w.cross(P.w.cross(l.r));        // a_Pi
+    const double L = l.d.norm();
+    const double L_dot = l.d.dot(v) / L;
+    out.L(i) = L;
+    out.L_dot(i) = L_dot;
+    out.L_ddot(i) = (v.squaredNorm() + l.d.dot(a) - L_dot * L_dot) / L;
+  }
+  return out;
+}
+
+BodyMotion bodyMotion(const Geometry& geometry, const Pose& x, const Vec6& x_dot,
+                      const Vec6& x_ddot) noexcept {
+  const Mat3 E = angleRateMap(x.rpy);
+  BodyMotion P;
+  P.X = geometry.fromHome(x);
+  P.v = x_dot.head<3>();
+  P.w = E * x_dot.tail<3>();
+  P.a = x_ddot.head<3>();
+  P.alpha = E * x_ddot.tail<3>() + angleRateMapDerivative(x.rpy, x_dot.tail<3>()) * x_dot.tail<3>();
+  return P;
+}
+
+ForwardSolution forwardPose(const Geometry& geometry, const Vec6& L,
+                            const Transform& guess) noexcept {
+  ForwardSolution out;
+  out.X_IP = guess;
+  if (!L.allFinite() || !(L.minCoeff() > 0.0)) return out;
+  if (!guess.p.allFinite() || !guess.R.allFinite()) return out;
+  for (out.iterations = 0;; ++out.iterations) {
+    Vec6 f;  // half of (2.22): (|d|^2 - L^2) / 2
+    Mat6 J;  // half of its derivative with respect to the twist
+    for (int i = 0; i < kLegs; ++i) {
+      const Leg l = leg(geometry, out.X_IP, i);
+      f(i) = 0.5 * (l.d.squaredNorm() - L(i) * L(i));
+      J.row(i) << l.d.transpose(), l.r.cross(l.d).transpose();
+    }
+    out.residual = (f.array() / L.array()).abs().maxCoeff<Eigen::PropagateNaN>();
+    if (!std::isfinite(out.residual)) {
+      out.status = SolveStatus::kInvalid;
+      return out;
+    }
+    if (out.residual <= kForwardTolerance) {
+      // One step of the polar iteration: warm starts must not let R drift from orthogonality.
+      out.X_IP.R = 0.5 * out.X_IP.R * (3.0 * Mat3::Identity() - out.X_IP.R.transpose() * out.X_IP.R);
+      out.status = SolveStatus::kConverged;
+      return out;
+    }
+    if (out.iterations == kForwardIterations) {
+      out.status = SolveStatus::kIterationLimit;
+      return out;
+    }
+    const Eigen::PartialPivLU<Mat6> lu(J);
+    if (!regular(lu)) {
+      out.status = SolveStatus::kSingular;
+      return out;
+    }
+    const Vec6 step = lu.solve(-f);
+    out.X_IP.p += step.head<3>();
+    out.X_IP.R = rotationOf(step.tail<3>()) * out.X_IP.R;
+  }
+}
+
+bool forwardMotion(const Geometry& geometry, const Transform& X_IP, const LegMotion& legs,
+                   BodyMotion& P) noexcept {
+  P.X = X_IP;
+  const Eigen::PartialPivLU<Mat6> lu(halfJacobian(geometry, X_IP));
+  if (!regular(lu)) return false;
+
+  const Vec6 twist = lu.solve(legs.L.cwiseProduct(legs.L_dot));
+  P.v = twist.head<3>();
+  P.w = twist.tail<3>();
+
+  // d/dt (d . v_Pi) = |v_Pi|^2 + d . a_Pi, with the centripetal part of a_Pi on the right.
+  Vec6 rhs = legs.L_dot.cwiseAbs2() + legs.L.cwiseProduct(legs.L_ddot);
+  for (int i = 0; i < kLegs; ++i) {
+    const Leg l = leg(geometry, X_IP, i);
+    rhs(i) -= (P.v + P.w.cross(l.r)).squaredNorm() + l.d.dot(P.w.cross(P.w.cross(l.r)));
+  }
+  const Vec6 acceleration = lu.solve(rhs);
+  P.a = acceleration.head<3>();
+  P.alpha = acceleration.tail<3>();
+  return true;
+}
+
+}  // namespace ves

@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/plant/plant.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ves::plant {
+namespace {
+
+double seconds(std::int64_t ns) { return static_cast<double>(ns) * kSecondPerNanosecond; }
+
+constexpr std::int64_t kMidUpdate = kUpdatePeriod / 2;  // [ns]
+
+Transform inverse(const Transform& X_AB) {
+  return {X_AB.R.transpose(), X_AB.R.transpose() * -X_AB.p};
+}
+
+}  // namespace
+
+Plant::Plant(const PlantConfig& config)
+    : config_(config),
+      carried_(config.payload.robot),
+      sensor_(config.sensor, Noise(config.seed)),
+      filter_position_(config.filter_cutoff),
+      filter_velocity_(config.filter_cutoff),
+      filter_acceleration_(config.filter_cutoff),
+      sensor_step_(sensor_.prepare(seconds(kUpdatePeriod))),
+      position_step_(filter_position_.prepare(seconds(kUpdatePeriod))),
+      rate_step_(filter_velocity_.prepare(seconds(kUpdatePeriod))),
+      next_look_(kNever) {
+  const Payload& payload = config_.payload;
+  const Transform X_L0P = inverse(payload.X_PL0());
+  carried_.base = combine(carried_.base, X_L0P * payload.X_PR, payload.adapter_R);
+  carried_.base = combine(carried_.base, X_L0P * payload.X_PS, payload.top_plate_S);
+  X_SL0_ = inverse(payload.X_PS) * payload.X_PL0();
+
+  truth_.P.X = config_.geometry.fromHome(config_.initial_pose);
+  truth_.legs.L = legLengths(config_.geometry, truth_.P.X);
+  truth_.joints.q = config_.initial_joints;
+  for (int i = 0; i < kMaxJoints; ++i) {
+    const Eigen::Matrix<double, 1, 1> q(config_.initial_joints(i));
+    PathPoint<1> rest;
+    rest.x = q;
+    paths_[static_cast<std::size_t>(i)].path = Quintic<1>(rest, q, 1.0);
+  }
+  robot_event_done_.assign(config_.robot_events.size(), false);
+  for (int i = 0; i < kLegs; ++i) {
+    const double L = truth_.legs.L(i);
+    const std::int32_t count = config_.transducer.count(L);
+    actuators_.emplace_back(config_.actuator, L);
+    slaves_.emplace_back(config_.leg_slave, count);
+    reference_[static_cast<std::size_t>(i)] = count;
+  }
+  filter_position_.settle(truth_.legs.L.array());
+  filter_velocity_.settle(Vec6::Zero().array());
+  filter_acceleration_.settle(Vec6::Zero().array());
+  sensor_.settle(sensorLoad());
+}
+
+void Plant::command(const LegCommand& command) noexcept {
+  if (!command.engaged) return;
+  reference_ = command.counts;
+  if (command.segment == segment_) return;
+  segment_ = command.segment;
+  segment_start_ = now_;
+  planRobotEvent();
+}
+
+/// The next event of this segment that is still to come.
+void Plant::planRobotEvent() noexcept {
+  next_robot_event_ = kNever;
+  for (std::size_t i = 0; i < config_.robot_events.size(); ++i) {
+    const Cue& cue = config_.robot_events[i].cue;
+    if (cue.segment == segment_ && !robot_event_done_[i])
+      next_robot_event_ = std::min(next_robot_event_, segment_start_ + cue.after);
+  }
+}
+
+void Plant::startRobotEvents() noexcept {
+  for (std::size_t i = 0; i < config_.robot_events.size(); ++i) {
+    const RobotEvent& event = config_.robot_events[i];
+    if (robot_event_done_[i] || event.cue.segment != segment_ ||
+        segment_start_ + event.cue.after > now_)
+      continue;
+    robot_event_done_[i] = true;
+    moveRobot(event.move);
+  }
+  planRobotEvent();
+}
+
+bool Plant::moveRobot(const RobotMove& move) noexcept {
+  if (move.joint < 0 || move.joint >= carried_.joints || !std::isfinite(move.target) ||
+      !std::isfinite(move.duration) || !(move.duration > 0.0))
+    return false;
+  JointPath& joint = paths_[static_cast<std::size_t>(move.joint)];
+  const PathPoint<1> from = joint.path.at(seconds(now_ - joint.start));
+  joint.path = Quintic<1>(from, Eigen::Matrix<double, 1, 1>(move.target), move.duration);
+  joint.start = now_;
+  return true;
+}
+
+void Plant::advance(std::int64_t until) noexcept {
+  for (;;) {
+    const std::int64_t next = std::min({next_reading_, next_look_, next_robot_event_});
+    if (next > until) break;
+    moveActuators(next);
+    if (next == next_robot_event_) startRobotEvents();
+    if (next == next_look_) {
+      look();
+      next_look_ = kNever;
+    }
+    if (next == next_reading_) {
+      readTransducers();
+      next_reading_ += kTransducerPeriod;
+    }
+  }
+  moveActuators(until);
+}
+
+void Plant::moveActuators(std::int64_t to) noexcept {
+  if (to <= now_) return;
+  const double dt = seconds(to - now_);
+  const double decay = std::exp(-dt / config_.actuator.tau);
+  for (std::size_t i = 0; i < kLegs; ++i) actuators_[i].advance(slaves_[i].current(), dt, decay);
+  now_ = to;
+}
+
+void Plant::readTransducers() noexcept {
+  for (std::size_t i = 0; i < kLegs; ++i)
+    slaves_[i].read(config_.transducer.count(actuators_[i].length()), reference_[i]);
+  if (slaves_[0].updated()) next_look_ = now_ + kMidUpdate;
+}
+
+JointState Plant::jointsNow() const noexcept {
+  JointState joints;
+  for (int i = 0; i < carried_.joints; ++i) {
+    const JointPath& joint = paths_[static_cast<std::size_t>(i)];
+    const PathPoint<1> at = joint.path.at(seconds(now_ - joint.start));
+    joints.q(i) = at.x(0);
+    joints.q_dot(i) = at.x_dot(0);
+    joints.q_ddot(i) = at.x_ddot(0);
+  }
+  return joints;
+}
+
+Wrench Plant::sensorLoad() const noexcept {
+  const Transform X_PL0 = config_.payload.X_PL0();
+  const FeltMotion felt = feltMotion(truth_.P, X_PL0, config_.gravity);
+  const Wrench on_robot = newtonEuler(carried_, truth_.joints, felt).F_L0o_L0;
+  return transfer(X_SL0_, Wrench{} - on_robot);
+}
+
+LegMotion Plant::legOutputs(double dt) noexcept {
+  LegMotion out;
+  for (int i = 0; i < kLegs; ++i) {
+    const Actuator& actuator = actuators_[static_cast<std::size_t>(i)];
+    out.L(i) = actuator.length();
+    out.L_dot(i) = actuator.velocity();
+    out.L_ddot(i) = actuator.acceleration();
+  }
+  truth_.legs = out;
+  if (config_.filters == LegFilters::kNone) return out;
+  const bool regular = dt == position_step_.dt;
+  const auto position = regular ? position_step_ : filter_position_.prepare(dt);
+  const auto rate = regular ? rate_step_ : filter_velocity_.prepare(dt);
+  filter_position_.advance(position, out.L.array());
+  filter_velocity_.advance(rate, out.L_dot.array());
+  filter_acceleration_.advance(rate, out.L_ddot.array());
+  return {filter_position_.output().matrix(), filter_velocity_.output().matrix(),
+          filter_acceleration_.output().matrix()};
+}
+
+/// Brings platform, robot and sensor from the last look to now.
+void Plant::look() noexcept {
+  if (now_ <= last_look_) return;
+  const double dt = seconds(now_ - last_look_);
+  last_look_ = now_;
+
+  const LegMotion legs = legOutputs(dt);
+  Transform guess = truth_.P.X;
+  guess.p += dt * truth_.P.v;
+  guess.R = rotationOf(dt * truth_.P.w) * guess.R;
+  const ForwardSolution forward = forwardPose(config_.geometry, legs.L, guess);
+  truth_.legs_agree =
+      forward.ok() && forwardMotion(config_.geometry, forward.X_IP, legs, truth_.P);
+  truth_.joints = jointsNow();
+
+  const Wrench F_So_S = sensorLoad();
+  sensor_.advance(dt == sensor_step_.dt ? sensor_step_ : sensor_.prepare(dt), F_So_S);
+  truth_.F_Po_I = rotate(truth_.P.X.R, transfer(config_.payload.X_PS, F_So_S));
+}
+
+Sample Plant::sample() noexcept {
+  look();
+  truth_.time = now_;
+  truth_.x = config_.geometry.toHome(truth_.P.X);
+  Sample s;
+  s.sequence = ++sequence_;
+  s.time = now_;
+  s.adc = sensor_.convert();
+  for (std::size_t i = 0; i < kLegs; ++i) {
+    s.legs[i] = config_.transducer.count(actuators_[i].length());
+    truth_.current(static_cast<Eigen::Index>(i)) = slaves_[i].current();
+  }
+  s.q = truth_.joints.q;
+  s.switches = kAllSwitchesClosed;
+  for (const SwitchEvent& event : config_.switch_events) {
+    const std::int64_t start = segment_start_ + event.cue.after;
+    if (event.cue.segment == segment_ && now_ >= start && now_ < start + event.duration)
+      s.switches &= ~event.switches;
+  }
+  return s;
+}
+
+}  // namespace ves::plant

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/realtime/realtime.hpp"
+
+#include <fmt/format.h>
+#include <sched.h>
+#include <sys/mman.h>
+#include <time.h>
+
+#include <cerrno>
+#include <cstring>
+
+#include "ves/config/document.hpp"
+
+namespace ves {
+namespace {
+
+constexpr std::int64_t kSecond = 1'000'000'000;  // [ns]
+
+}  // namespace
+
+std::int64_t monotonicNow() noexcept {
+  timespec now;
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return now.tv_sec * kSecond + now.tv_nsec;
+}
+
+std::int64_t Ticker::wait() noexcept {
+  next_ += period_;
+  std::int64_t missed = 0;
+  const std::int64_t now = monotonicNow();
+  if (now > next_) {
+    missed = (now - next_) / period_;
+    next_ += missed * period_;
+    missed_ += missed;
+  }
+  const timespec until{next_ / kSecond, next_ % kSecond};
+  while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr) == EINTR) {
+  }
+  late_ = monotonicNow() - next_;
+  return missed;
+}
+
+bool claimRealtime(int priority, bool required) {
+  sched_param param{};
+  param.sched_priority = priority;
+  const char* refused = nullptr;
+  if (sched_setscheduler(0, SCHED_FIFO, &param) != 0)
+    refused = "SCHED_FIFO";
+  else if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0)
+    refused = "locked memory";
+  if (!refused) return true;
+  const std::string reason =
+      fmt::format("{} refused: {} (see ulimit -r and -l, or run as root)", refused,
+                  std::strerror(errno));
+  if (required) throw InputError("--realtime: " + reason);
+  return false;
+}
+
+}  // namespace ves

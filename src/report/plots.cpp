@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/report/plots.hpp"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+
+namespace ves {
+namespace {
+
+constexpr const char* kCoordinate[] = {"x", "y", "z", "alpha", "beta", "gamma"};
+constexpr const char* kWrench[] = {"fx", "fy", "fz", "mx", "my", "mz"};
+constexpr const char* kColour[] = {"#0072b2", "#d55e00", "#009e73"};  // distinct to most eyes
+
+/// For gnuplot, between single quotes.
+std::string quoted(const std::string& text) {
+  std::string out = "'";
+  for (const char c : text) out += c == '\'' ? std::string("''") : std::string(1, c);
+  return out + "'";
+}
+
+struct Span {
+  double from, to;  // [s]
+};
+
+struct Curve {
+  std::string formula;  // gnuplot, of the columns of series.csv
+  std::string title;
+  std::string colour;
+  bool dashed = false;
+};
+
+std::string scaled(const std::string& column, double factor) {
+  return fmt::format("column('{}')*{}", column, factor);
+}
+
+/// A picture of panels, as a gnuplot script.
+class Page {
+ public:
+  Page(const std::string& file, const std::string& title, Span span, int rows, int cols)
+      : panels_(rows * cols), cols_(cols) {
+    script_ = fmt::format(
+        "reset\nset datafile separator ','\nset datafile columnheaders\n"
+        "set terminal pngcairo noenhanced size 1500,{} font 'DejaVu Sans,12' background '#ffffff'\n"
+        "set output {}\n"
+        "set multiplot layout {},{} title {} font 'DejaVu Sans,13' margins 0.06,0.985,{},0.90 "
+        "spacing 0.06,0.09\n"
+        "set grid lc rgb '#dddddd' lw 1\nset border 3 lc rgb '#555555'\nset tics nomirror\n"
+        "set key top right horizontal samplen 2 font 'DejaVu Sans,11'\nset xrange [{}:{}]\n"
+        "set offsets graph 0,0,0.18,0.05\n",
+        rows == 1 ? 480 : 800, quoted(file), rows, cols, quoted(title), rows == 1 ? 0.14 : 0.085,
+        span.from, span.to);
+  }
+
+  void panel(const std::string& ylabel, const std::vector<Curve>& curves) {
+    const bool bottom = ++drawn_ > panels_ - cols_;
+    script_ += fmt::format("set ylabel {} offset 1\nset xlabel {}\nplot ", quoted(ylabel),
+                           quoted(bottom ? "time [s]" : ""));
+    for (std::size_t i = 0; i < curves.size(); ++i)
+      script_ += fmt::format(
+          "{}'series.csv' using (column('t_s')):({}) with lines lw {} dt {} lc rgb '{}' title {}",
+          i ? ", " : "", curves[i].formula, curves[i].dashed ? 1.5 : 2.0, curves[i].dashed ? 2 : 1,
+          curves[i].colour, quoted(curves[i].title));
+    script_ += "\n";
+  }
+
+  std::string script() const { return script_ + "unset multiplot\nunset output\n"; }
+
+ private:
+  std::string script_;
+  int panels_, cols_, drawn_ = 0;
+};
+
+bool in(const Row& row, Phase phase) { return row.state.phase == static_cast<int>(phase); }
+
+}  // namespace
+
+std::vector<std::filesystem::path> drawPlots(const Series& series,
+                                             const std::filesystem::path& folder) {
+  if (series.rows.empty()) return {};
+  const Experiment& experiment = series.experiment;
+  // The program, not the wait before it; wrenches only once the sensor's bias is known.
+  Span program{0.0, series.rows.back().t}, calibrated{-1.0, program.to};
+  bool waiting = true;
+  for (const Row& row : series.rows) {
+    if (waiting && !in(row, Phase::kDisarmed)) {
+      program.from = row.t;
+      waiting = false;
+    }
+    if (in(row, Phase::kRunning) && row.state.segment >= 0 &&
+        experiment.controller.program.segments[static_cast<std::size_t>(row.state.segment)].kind ==
+            SegmentKind::kCalibration)
+      calibrated.from = row.t;
+  }
+
+  const double mm = 1e3, degrees = 1.0 / kDegree;
+  const auto name = [](int i, const char* what) {
+    return fmt::format("{}_{}_{}", kCoordinate[i], what, i < 3 ? "m" : "rad");
+  };
+  std::string script = fmt::format("cd {}\n", quoted(folder.string()));
+  std::vector<std::string> files;
+  const auto finish = [&](const std::string& file, const Page& page) {
+    files.push_back(file);
+    script += page.script();
+  };
+
+  Page pose("pose.png", experiment.name + ": pose of the platform, from home", program, 2, 3);
+  for (int i = 0; i < 6; ++i) {
+    const double scale = i < 3 ? mm : degrees;
+    pose.panel(fmt::format("{} [{}]", kCoordinate[i], i < 3 ? "mm" : "deg"),
+               {{scaled(name(i, "actual"), scale), "actual", kColour[0], false},
+                {scaled(name(i, "due"), scale), "commanded", kColour[1], true}});
+  }
+  finish("pose.png", pose);
+
+  Page error("error.png", experiment.name + ": commanded minus actual pose", program, 1, 2);
+  for (int half = 0; half < 2; ++half) {
+    std::vector<Curve> curves;
+    for (int i = 3 * half; i < 3 * half + 3; ++i)
+      curves.push_back({fmt::format("(column('{}')-column('{}'))*{}", name(i, "due"),
+                                    name(i, "actual"), half ? degrees : mm),
+                        kCoordinate[i], kColour[i % 3], false});
+    error.panel(half ? "orientation error [deg]" : "position error [mm]", curves);
+  }
+  finish("error.png", error);
+
+  if (calibrated.from >= 0.0) {
+    Page wrench("wrench.png",
+                experiment.name + ": wrench on the platform, gravity compensated, about {P} in {I}",
+                calibrated, 1, 2);
+    for (int half = 0; half < 2; ++half) {
+      std::vector<Curve> curves;
+      for (int i = 3 * half; i < 3 * half + 3; ++i)
+        curves.push_back({fmt::format("column('{}_dynamic_{}')", kWrench[i], half ? "nm" : "n"),
+                          kWrench[i], kColour[i % 3], false});
+      wrench.panel(half ? "moment [N m]" : "force [N]", curves);
+    }
+    finish("wrench.png", wrench);
+  }
+
+  Page legs("legs.png", experiment.name + ": leg lengths", program, 2, 3);
+  for (int i = 1; i <= kLegs; ++i)
+    legs.panel(fmt::format("leg {} [mm]", i),
+               {{scaled(fmt::format("leg{}_measured_m", i), mm), "measured", kColour[0], false},
+                {scaled(fmt::format("leg{}_commanded_m", i), mm), "commanded", kColour[1], true}});
+  finish("legs.png", legs);
+
+  std::FILE* gnuplot = popen("gnuplot", "w");
+  if (gnuplot) {
+    std::fputs(script.c_str(), gnuplot);
+    pclose(gnuplot);
+  }
+  std::vector<std::filesystem::path> drawn;
+  for (const std::string& file : files) {
+    std::error_code none;
+    if (std::filesystem::exists(folder / file, none)) drawn.push_back(folder / file);
+  }
+  return drawn;
+}
+
+}  // namespace ves

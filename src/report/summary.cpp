@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/report/summary.hpp"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+
+namespace ves {
+namespace {
+
+constexpr const char* kCoordinate[] = {"x", "y", "z", "alpha", "beta", "gamma"};
+constexpr double kStill = 0.5;    // [s] without commanded motion: the sensor's filter has settled
+constexpr double kMoved = 1e-6;   // [m | rad] least range of a coordinate that counts as moving
+
+bool running(const Row& row) { return row.state.phase == static_cast<int>(Phase::kRunning); }
+
+const Segment& segmentOf(const Series& series, const Row& row) {
+  return series.experiment.controller.program
+      .segments[static_cast<std::size_t>(std::clamp(row.state.segment, 0, kMaxSegments - 1))];
+}
+
+/// Trajectory and admittance segments: what the experiment is about.
+bool measured(const Series& series, const Row& row) {
+  const SegmentKind kind = segmentOf(series, row).kind;
+  return running(row) && row.has_truth &&
+         (kind == SegmentKind::kTrajectory || kind == SegmentKind::kAdmittance);
+}
+
+struct Tracking {
+  double low = HUGE_VAL, high = -HUGE_VAL;  // of where it should be
+  double rising = 0.0, falling = 0.0;       // largest error with the rate positive, negative
+  double sum_e2 = 0.0, sum_ev = 0.0, sum_v2 = 0.0;
+  std::int64_t n = 0;
+
+  void add(double due, double actual, double rate) {
+    const double e = due - actual;
+    low = std::min(low, due);
+    high = std::max(high, due);
+    if (rate > 0.0) rising = std::max(rising, std::abs(e));
+    if (rate < 0.0) falling = std::max(falling, std::abs(e));
+    sum_e2 += e * e;
+    sum_ev += e * rate;
+    sum_v2 += rate * rate;
+    ++n;
+  }
+  double rms() const { return std::sqrt(sum_e2 / static_cast<double>(n)); }
+  /// The delay that explains most of the error: e = lag * rate, least squares.
+  double lag() const { return sum_ev / sum_v2; }
+};
+
+void addTracking(const Series& series, nlohmann::ordered_json& out) {
+  Tracking tracking[6];
+  for (const Row& row : series.rows)
+    if (measured(series, row))
+      for (int i = 0; i < 6; ++i)
+        tracking[i].add(row.state.x_due[i], row.truth.x[i], row.state.x_dot[i]);
+  for (int i = 0; i < 6; ++i) {
+    const Tracking& t = tracking[i];
+    if (!(t.high - t.low > kMoved)) continue;
+    const std::string name = kCoordinate[i];
+    const char* unit = i < 3 ? "m" : "rad";
+    out[fmt::format("{}_peak_to_peak_{}", name, unit)] = t.high - t.low;
+    out[fmt::format("{}_error_max_{}", name, unit)] = std::max(t.rising, t.falling);
+    if (i == 2) {  // all legs extend, or retract, together
+      out["z_error_max_extending_m"] = t.rising;
+      out["z_error_max_retracting_m"] = t.falling;
+    }
+    out[fmt::format("{}_error_rms_{}", name, unit)] = t.rms();
+    if (t.sum_v2 > 0.0) out[name + "_lag_s"] = t.lag();
+  }
+}
+
+/// What gravity compensation leaves, once a calibration has been made.
+void addWrench(const Series& series, nlohmann::ordered_json& out) {
+  struct Largest {
+    double force = 0.0, moment = 0.0;
+    bool any = false;
+    void add(const double (&w)[6]) {
+      force = std::max(force, std::hypot(w[0], w[1], w[2]));
+      moment = std::max(moment, std::hypot(w[3], w[4], w[5]));
+      any = true;
+    }
+  } still, moving;
+  bool calibrated = false;
+  double still_since = HUGE_VAL;
+  for (const Row& row : series.rows) {
+    const double rate = *std::max_element(row.state.x_dot, row.state.x_dot + 6) -
+                        *std::min_element(row.state.x_dot, row.state.x_dot + 6);
+    if (rate != 0.0 || still_since == HUGE_VAL) still_since = row.t;
+    if (!running(row)) continue;
+    if (segmentOf(series, row).kind == SegmentKind::kCalibration) {
+      calibrated = true;
+      continue;
+    }
+    if (!calibrated) continue;
+    (row.t - still_since > kStill ? still : moving).add(row.state.dynamic);
+  }
+  const auto write = [&](const char* name, const Largest& l) {
+    if (!l.any) return;
+    out[fmt::format("dynamic_force_max_{}_n", name)] = l.force;
+    out[fmt::format("dynamic_moment_max_{}_nm", name)] = l.moment;
+  };
+  write("still", still);
+  write("moving", moving);
+}
+
+void addTiming(const Series& series, nlohmann::ordered_json& out) {
+  std::vector<double> late, compute, age;
+  std::int64_t missed = 0;
+  for (const Row& row : series.rows) {
+    if (!row.has_timing) continue;
+    late.push_back(static_cast<double>(row.timing.late_ns) * kSecondPerNanosecond);
+    compute.push_back(static_cast<double>(row.timing.compute_ns) * kSecondPerNanosecond);
+    age.push_back(static_cast<double>(row.timing.sample_age_ns) * kSecondPerNanosecond);
+    missed = row.timing.missed;
+  }
+  if (late.empty()) return;
+  const auto write = [&](const char* name, std::vector<double>& values) {
+    std::sort(values.begin(), values.end());
+    const auto at = [&](double share) {
+      return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
+    };
+    out[fmt::format("{}_median_s", name)] = at(0.5);
+    out[fmt::format("{}_p99_s", name)] = at(0.99);
+    out[fmt::format("{}_max_s", name)] = at(1.0);
+  };
+  write("wake_up_late", late);
+  write("tick_compute", compute);
+  write("sample_age", age);
+  out["ticks_missed"] = missed;
+}
+
+}  // namespace
+
+nlohmann::ordered_json summarise(const Series& series, const RunResult& result) {
+  nlohmann::ordered_json out;
+  out["scenario"] = series.experiment.name;
+  out["description"] = series.experiment.description;
+  out["configuration_hash"] = series.experiment.hash;
+  out["seed"] = series.experiment.plant.seed;
+  out["version"] = series.version;
+  out["substitute_values"] = series.experiment.substitutes;
+  out["ended"] = name(result.phase);
+  out["trips"] = nlohmann::ordered_json::array();
+  if (!series.rows.empty()) {
+    const Tripped latched(static_cast<std::uint32_t>(series.rows.back().state.latched));
+    for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(Check::kCount); ++i)
+      if (latched.has(static_cast<Check>(i))) out["trips"].push_back(name(static_cast<Check>(i)));
+  }
+  out["first_cause"] = name(result.cause);
+  out["first_cause_tick"] = result.cause_tick;
+  out["ticks"] = result.ticks;
+  out["simulated_s"] = result.simulated;
+  out["wall_s"] = result.wall;
+  out["real_time_factor"] = result.wall > 0.0 ? result.simulated / result.wall : 0.0;
+  addTracking(series, out);
+  addWrench(series, out);
+  addTiming(series, out);
+  return out;
+}
+
+std::string table(const nlohmann::ordered_json& s) {
+  const auto number = [&](const std::string& key) { return s.contains(key) ? s[key].get<double>() : NAN; };
+  std::string out = fmt::format("{}\n\n", s["description"].get<std::string>());
+  out += fmt::format("  ended {} after {:.2f} s ({} ticks), {:.4g} x real time, {} substitute values\n",
+                     s["ended"].get<std::string>(), number("simulated_s"),
+                     s["ticks"].get<std::int64_t>(), number("real_time_factor"),
+                     s["substitute_values"].get<int>());
+  if (!s["trips"].empty())
+    out += fmt::format("  stopped in tick {} by: {}\n", s["first_cause_tick"].get<std::int64_t>(),
+                       s["first_cause"].get<std::string>());
+  bool head = false;
+  for (int i = 0; i < 6; ++i) {
+    const std::string c = kCoordinate[i], unit = i < 3 ? "m" : "rad";
+    if (!s.contains(c + "_error_rms_" + unit)) continue;
+    if (!std::exchange(head, true))
+      out += fmt::format("\n  {:<8}{:>16}{:>16}{:>16}{:>10}\n", "", "moved", "error, peak",
+                         "error, rms", "lag");
+    const double scale = i < 3 ? 1e3 : 1.0 / kDegree;
+    const char* shown = i < 3 ? "mm" : "deg";
+    const auto cell = [&](const std::string& what) {
+      return fmt::format("{:.3f} {:<3}", number(c + what + unit) * scale, shown);
+    };
+    out += fmt::format("  {:<8}{:>16}{:>16}{:>16}{:>7.1f} ms\n", c, cell("_peak_to_peak_"),
+                       cell("_error_max_"), cell("_error_rms_"), number(c + "_lag_s") * 1e3);
+  }
+  if (s.contains("z_error_max_extending_m"))
+    out += fmt::format("  z error  {:.1f} mm extending, {:.1f} mm retracting\n",
+                       number("z_error_max_extending_m") * 1e3,
+                       number("z_error_max_retracting_m") * 1e3);
+  for (const char* when : {"still", "moving"}) {
+    const std::string force = fmt::format("dynamic_force_max_{}_n", when);
+    if (s.contains(force))
+      out += fmt::format("  wrench without gravity, platform {:<7} at most {:8.3f} N, {:8.3f} N m\n",
+                         when, number(force),
+                         number(fmt::format("dynamic_moment_max_{}_nm", when)));
+  }
+  if (s.contains("wake_up_late_median_s"))
+    out += fmt::format(
+        "  timing   woke {:.0f} us late (p99 {:.0f}, max {:.0f}), computed {:.0f} us (p99 {:.0f}), "
+        "sample {:.1f} ms old, {} ticks missed\n",
+        number("wake_up_late_median_s") * 1e6, number("wake_up_late_p99_s") * 1e6,
+        number("wake_up_late_max_s") * 1e6, number("tick_compute_median_s") * 1e6,
+        number("tick_compute_p99_s") * 1e6, number("sample_age_median_s") * 1e3,
+        s["ticks_missed"].get<std::int64_t>());
+  return out;
+}
+
+void writeSummary(const nlohmann::ordered_json& summary, const std::string& file) {
+  std::ofstream out(file);
+  out << summary.dump(2) << "\n";
+  out.flush();
+  if (!out) throw InputError(file + ": cannot be written");
+}
+
+}  // namespace ves

@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+#include <signal.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstring>
+
+#include "ves/realtime/realtime.hpp"
+#include "ves/run/run.hpp"
+#include "ves/transport/channels.hpp"
+
+namespace ves {
+namespace {
+
+/// A child that ends with us.
+class Process {
+ public:
+  Process(const std::filesystem::path& program, const std::vector<std::string>& arguments) {
+    std::vector<char*> argv;
+    std::string name = program.string();
+    argv.push_back(name.data());
+    std::vector<std::string> copies = arguments;
+    for (std::string& argument : copies) argv.push_back(argument.data());
+    argv.push_back(nullptr);
+    const pid_t parent = getpid();
+    pid_ = fork();
+    if (pid_ < 0) throw InputError(fmt::format("{}: cannot be started: {}", name, strerror(errno)));
+    if (pid_ > 0) return;
+    setpgid(0, 0);  // a Ctrl-C on the terminal is the launcher's to interpret
+    prctl(PR_SET_PDEATHSIG, SIGTERM);
+    if (getppid() != parent) _exit(1);
+    execv(name.c_str(), argv.data());
+    fmt::print(stderr, "{}: cannot be started: {}\n", name, strerror(errno));
+    _exit(127);
+  }
+  ~Process() {
+    if (running()) {
+      signal(SIGTERM);
+      waitpid(pid_, &status_, 0);
+    }
+  }
+  Process(const Process&) = delete;
+  Process& operator=(const Process&) = delete;
+
+  bool running() {
+    if (pid_ > 0 && waitpid(pid_, &status_, WNOHANG) == pid_) pid_ = 0;
+    return pid_ > 0;
+  }
+  void signal(int number) {
+    if (pid_ > 0) kill(pid_, number);
+  }
+  /// Exit status of an ended child, -1 when a signal ended it.
+  int status() const { return WIFEXITED(status_) ? WEXITSTATUS(status_) : -1; }
+
+ private:
+  pid_t pid_ = 0;
+  int status_ = 0;
+};
+
+std::int64_t wallClock() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+}  // namespace
+
+RunResult runProcesses(const Experiment& experiment, const LaunchOptions& options,
+                       const std::function<void(const state_t&)>& watch,
+                       const std::function<bool()>& stop) {
+  const ProcessOptions& process = options.process;
+  Bus bus(process.url);
+  std::unique_ptr<LogWriter> log;
+  // In lockstep the controller records: it is the one that misses nothing.
+  if (!process.log.empty() && !process.lockstep) {
+    log = std::make_unique<LogWriter>(process.log);
+    log->write(channel::kExperiment, describe(experiment, {}, 0), wallClock());
+  }
+  RunResult result;
+  bus.subscribe("VES_(SAMPLE|LEG_COMMAND|STATE|TRUTH|TIMING|ROBOT|OPERATOR)",
+                [&](const std::string& channel, const void* data, std::uint32_t size) {
+                  if (log) log->write(channel, data, size, wallClock());
+                  if (channel != channel::kState) return;
+                  const auto state = decode<state_t>(data, size);
+                  if (!state) return;
+                  ++result.ticks;
+                  result.phase = static_cast<Phase>(state->phase);
+                  result.cause = result.phase == Phase::kDisarmed
+                                     ? Tripped(static_cast<std::uint32_t>(state->tripped)).first()
+                                     : static_cast<Check>(state->cause);
+                  result.cause_tick = state->cause_tick;
+                  watch(*state);
+                });
+
+  std::vector<std::string> shared = {options.scenario.string(), "--url", process.url};
+  if (process.lockstep) shared.push_back("--lockstep");
+  if (process.realtime) shared.push_back("--realtime");
+  std::vector<std::string> arguments = shared;
+  if (process.lockstep && !process.log.empty())
+    arguments.insert(arguments.end(), {"--log", process.log});
+
+  const std::int64_t start = monotonicNow();
+  Process plant(options.programs / "ves-plant", shared);
+  Process controller(options.programs / "ves-controller", arguments);
+  bool asked = false;
+  while (controller.running()) {
+    bus.wait(50);
+    bus.drain();
+    if (!plant.running() && !asked) {
+      controller.signal(SIGTERM);
+      throw InputError(fmt::format("ves-plant ended early, status {}", plant.status()));
+    }
+    if (stop() && !std::exchange(asked, true)) controller.signal(SIGINT);
+  }
+  bus.drain();
+  result.wall = static_cast<double>(monotonicNow() - start) * kSecondPerNanosecond;
+  result.simulated =
+      static_cast<double>(result.ticks * experiment.controller.period) * kSecondPerNanosecond;
+  if (controller.status() != 0 && controller.status() != 1)
+    throw InputError(fmt::format("ves-controller ended with status {}", controller.status()));
+  return result;
+}
+
+}  // namespace ves

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/realtime/realtime.hpp"
+#include "ves/run/run.hpp"
+#include "ves/run/ending.hpp"
+#include "ves/transport/channels.hpp"
+
+namespace ves {
+
+experiment_t describe(const Experiment& experiment, const Identity& from, std::int64_t time) {
+  experiment_t m;
+  m.header = header(from, 0, time);
+  m.name = experiment.name;
+  m.hash = experiment.hash;
+  m.version = kVersion;
+  m.resolved = experiment.resolved;
+  return m;
+}
+
+RunResult runLockstep(const Experiment& experiment, LogWriter* log, const Watch& watch) {
+  const Identity controller{1, 0}, machine{2, 0};
+  const std::int64_t period = experiment.controller.period;
+  TestPlatform platform(experiment.controller);
+  plant::Plant plant(experiment.plant);
+  Ending ending(period);
+
+  const auto record = [&](const std::string& channel, const auto& message) {
+    if (log) log->write(channel, message, plant.time());
+  };
+  record(channel::kExperiment, describe(experiment, controller, 0));
+
+  const std::int64_t start = monotonicNow();
+  TickInput in;
+  in.request = Request::kStart;
+  for (;; ++in.tick) {
+    in.sample = plant.sample();
+    record(channel::kTruth, toMessage(plant.truth(), header(machine, in.sample.sequence, plant.time())));
+    record(channel::kSample, toMessage(in.sample, machine, in.tick - 1));
+
+    const TickState& state = platform.tick(in);
+    const header_t h = header(controller, in.tick, plant.time());
+    record(channel::kState, toMessage(state, in, h));
+    record(channel::kLegCommand, toMessage(state.command, h));
+    in.request = watch ? watch(state) : Request::kNone;
+    if (ending.reached(state)) break;
+
+    plant.command(state.command);
+    plant.advance((in.tick + 1) * period);
+  }
+  return ending.result(monotonicNow() - start);
+}
+
+}  // namespace ves

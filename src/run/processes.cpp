@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include "ves/realtime/realtime.hpp"
+#include "ves/run/ending.hpp"
+#include "ves/run/run.hpp"
+#include "ves/transport/channels.hpp"
+
+namespace ves {
+namespace {
+
+constexpr int kControllerPriority = 80;  // [-] SCHED_FIFO
+constexpr int kPlantPriority = 70;       // [-] SCHED_FIFO
+constexpr std::int64_t kPlantPeriod = 2'000'000;         // [ns] between the plant's samples, real time
+constexpr int kAnswerTime = 200;                         // [ms] lockstep, before a message is repeated
+constexpr int kAnswerTries = 50;                         // [-] before the other side counts as gone
+constexpr std::int64_t kFirstSampleTime = 10'000'000'000;  // [ns]
+
+void conduct(int priority, bool required) {
+  if (!claimRealtime(priority, required))
+    fmt::print(stderr, "no real-time privileges: running at best effort\n");
+}
+
+}  // namespace
+
+RunResult runController(const Experiment& experiment, const ProcessOptions& options,
+                        const Watch& watch) {
+  const Identity self = Identity::draw();
+  Bus bus(options.url);
+  ControllerLink link(bus, self);
+  TestPlatform platform(experiment.controller);
+  Ending ending(experiment.controller.period);
+
+  std::unique_ptr<LogWriter> log;
+  if (!options.log.empty()) {
+    log = std::make_unique<LogWriter>(options.log);
+    log->write(channel::kExperiment, describe(experiment, self, 0), 0);
+    bus.subscribe("VES_(SAMPLE|TRUTH)",
+                  [&log](const std::string& channel, const void* data, std::uint32_t size) {
+                    const auto any = decode<sample_t>(data, size);
+                    const auto truth = decode<truth_t>(data, size);
+                    const std::int64_t time = any     ? any->header.time_ns
+                                              : truth ? truth->header.time_ns
+                                                      : 0;
+                    log->write(channel, data, size, time);
+                  });
+  }
+  bus.publish(channel::kExperiment, describe(experiment, self, monotonicNow()));
+
+  TickInput in;
+  in.request = Request::kStart;
+  const std::int64_t start = monotonicNow();
+
+  const auto finish = [&](const TickState& state) {
+    in.request = watch ? watch(state) : Request::kNone;
+    if (const Request wish = link.takeRequest(); wish != Request::kNone) in.request = wish;
+    in.rival = link.takeRival();
+    return ending.reached(state);
+  };
+
+  if (options.lockstep) {
+    // The machine advances one period for each command and answers with one sample. A lost message is
+    // repeated; the answer to a repeated one is the same sample again.
+    LegCommand none;
+    leg_command_t out = toMessage(none, header(self, -1, 0));
+    for (;; ++in.tick) {
+      for (int i = 0; link.answers() != in.tick - 1; ++i) {
+        if (i == kAnswerTries)
+          throw InputError(fmt::format("bus {}: no machine in lockstep answers", options.url));
+        link.send(out);
+        const std::int64_t until = monotonicNow() + kAnswerTime * 1'000'000LL;
+        while (link.answers() != in.tick - 1 && monotonicNow() < until) bus.wait(kAnswerTime);
+      }
+      in.sample = link.sample();
+      const TickState& state = platform.tick(in);
+      const header_t h = header(self, in.tick, in.sample.time);
+      const state_t told = toMessage(state, in, h);
+      out = toMessage(state.command, h);
+      bus.publish(channel::kState, told);
+      if (log) {
+        log->write(channel::kState, told, in.sample.time);
+        log->write(channel::kLegCommand, out, in.sample.time);
+      }
+      if (finish(state)) break;
+      link.send(out);
+      bus.drain();
+    }
+    return ending.result(monotonicNow() - start);
+  }
+
+  conduct(kControllerPriority, options.realtime);
+  while (link.sample().sequence < 0) {
+    if (monotonicNow() - start > kFirstSampleTime)
+      throw InputError(fmt::format("bus {}: no machine to be heard", options.url));
+    bus.wait(100);
+  }
+  Ticker ticker(experiment.controller.period);
+  for (;; ++in.tick) {
+    in.tick += ticker.wait();
+    const std::int64_t woke = monotonicNow();
+    bus.drain();
+    in.sample = link.sample();
+    const std::int64_t sample_time = link.sampleTime();
+    in.rival = link.takeRival() || in.rival;
+
+    const TickState& state = platform.tick(in);
+
+    const header_t h = header(self, in.tick, woke);
+    link.send(toMessage(state.command, h));
+    const std::int64_t sent = monotonicNow();
+    bus.publish(channel::kState, toMessage(state, in, h));
+    timing_t timing;
+    timing.header = h;
+    timing.late_ns = ticker.late();
+    timing.compute_ns = sent - woke;
+    timing.sample_age_ns = woke - sample_time;
+    timing.missed = ticker.missed();
+    bus.publish(channel::kTiming, timing);
+    if (finish(state)) break;
+  }
+  return ending.result(monotonicNow() - start);
+}
+
+void runPlant(const Experiment& experiment, const ProcessOptions& options,
+              const std::function<bool()>& stop) {
+  const Identity self = Identity::draw();
+  Bus bus(options.url);
+  PlantLink link(bus);
+  plant::Plant plant(experiment.plant);
+  const std::int64_t period = experiment.controller.period;
+
+  const auto publish = [&](std::int64_t time, std::int64_t answers) {
+    const Sample sample = plant.sample();
+    bus.publish(channel::kTruth, toMessage(plant.truth(), header(self, sample.sequence, time)));
+    sample_t message = toMessage(sample, self, answers);
+    message.header.time_ns = time;
+    bus.publish(channel::kSample, message);
+    return message;
+  };
+
+  if (options.lockstep) {
+    std::int64_t answered = -2;
+    sample_t last;
+    while (!stop()) {
+      bus.wait(100);
+      for (const plant::RobotMove& move : link.takeMoves()) plant.moveRobot(move);
+      const auto command = link.takeCommand();
+      if (!command) continue;
+      const auto& [legs, tick] = *command;
+      if (tick == answered) {
+        bus.publish(channel::kSample, last);
+      } else if (tick == answered + 1) {
+        if (tick >= 0) {
+          plant.command(legs);
+          plant.advance((tick + 1) * period);
+        }
+        last = publish(plant.time(), tick);
+        answered = tick;
+      }
+    }
+    return;
+  }
+
+  conduct(kPlantPriority, options.realtime);
+  const std::int64_t start = monotonicNow();
+  Ticker ticker(kPlantPeriod);
+  while (!stop()) {
+    ticker.wait();
+    bus.drain();
+    const std::int64_t now = monotonicNow();
+    link.setTime(now);
+    for (const plant::RobotMove& move : link.takeMoves()) plant.moveRobot(move);
+    if (const auto command = link.takeCommand()) plant.command(command->first);
+    plant.advance(now - start);
+    publish(now, -1);
+  }
+}
+
+}  // namespace ves

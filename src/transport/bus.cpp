@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/transport/bus.hpp"
+
+#include <fmt/format.h>
+
+#include <cstring>
+
+#include "ves/config/document.hpp"
+#include "ves/transport/channels.hpp"
+
+namespace ves {
+namespace {
+
+// Ten samples wait at each tick in the worst case; a stalled controller must still find the newest.
+constexpr int kQueue = 4096;  // [-] messages
+
+/// One message to ourselves, within two seconds.
+bool echoes(lcm::LCM& lcm) {
+  const std::string channel = "VES_ECHO";
+  struct Heard {
+    bool yes = false;
+    void receive(const lcm::ReceiveBuffer*, const std::string&) { yes = true; }
+  } heard;
+  lcm::Subscription* const subscription = lcm.subscribe(channel, &Heard::receive, &heard);
+  if (!subscription) return false;
+  for (int i = 0; i < 20 && !heard.yes; ++i) {
+    if (lcm.publish(channel, "?", 1) != 0) break;
+    lcm.handleTimeout(100);
+  }
+  lcm.unsubscribe(subscription);
+  return heard.yes;
+}
+
+}  // namespace
+
+Bus::Bus(const std::string& url) : lcm_(url) {
+  if (!lcm_.good()) throw InputError(fmt::format("--url {}: not a bus that LCM can open", url));
+  if (!echoes(lcm_))
+    throw InputError(
+        fmt::format("bus {}: no message comes back; multicast needs a route on some interface "
+                    "(for one machine: ip link set lo multicast on; ip route add 224.0.0.0/4 dev "
+                    "lo), or use --private-bus",
+                    url));
+}
+
+void Bus::publish(const std::string& channel, const experiment_t& message) {
+  lcm_.publish(channel, &message);
+}
+
+void Bus::subscribe(const std::string& channel, Handler handler) {
+  subscribers_.push_back(std::make_unique<Subscriber>(Subscriber{std::move(handler)}));
+  lcm_.subscribe(channel, &Subscriber::receive, subscribers_.back().get())->setQueueCapacity(kQueue);
+}
+
+void Bus::drain() noexcept {
+  while (lcm_.handleTimeout(0) > 0) {
+  }
+}
+
+bool Bus::wait(int milliseconds) noexcept { return lcm_.handleTimeout(milliseconds) > 0; }
+
+bool busWorks(const std::string& url) {
+  lcm::LCM lcm(url);
+  return lcm.good() && echoes(lcm);
+}
+
+ControllerLink::ControllerLink(Bus& bus, const Identity& self) : bus_(bus), self_(self) {
+  bus.subscribe(channel::kSample, [this](const std::string&, const void* data, std::uint32_t size) {
+    const auto message = decode<sample_t>(data, size);
+    const auto sample = message ? fromMessage(*message) : std::nullopt;
+    // A plant that was started anew counts from zero; an older one is a ghost.
+    const bool renewed = message && message->header.epoch > plant_.epoch;
+    const bool same = message && message->header.epoch == plant_.epoch &&
+                      message->header.source == plant_.source;
+    if (!sample || !(renewed || (same && sample->sequence >= sample_.sequence))) {
+      ++rejected_;
+      return;
+    }
+    plant_ = {message->header.source, message->header.epoch};
+    sample_ = *sample;
+    answers_ = message->answers;
+    sample_time_ = message->header.time_ns;
+  });
+  bus.subscribe(channel::kLegCommand,
+                [this](const std::string&, const void* data, std::uint32_t size) {
+                  const auto message = decode<leg_command_t>(data, size);
+                  if (!message) ++rejected_;
+                  if (message && message->header.source != self_.source && message->engaged)
+                    rival_ = true;
+                });
+  bus.subscribe(channel::kOperator, [this](const std::string&, const void* data, std::uint32_t size) {
+    const auto message = decode<operator_t>(data, size);
+    const auto request = message ? fromMessage(*message) : std::nullopt;
+    if (!request) {
+      ++rejected_;
+      return;
+    }
+    if (*request != Request::kNone) request_ = *request;
+  });
+}
+
+void ControllerLink::send(const leg_command_t& command) noexcept {
+  bus_.publish(channel::kLegCommand, command);
+}
+
+PlantLink::PlantLink(Bus& bus) {
+  bus.subscribe(channel::kLegCommand,
+                [this](const std::string&, const void* data, std::uint32_t size) {
+                  const auto message = decode<leg_command_t>(data, size);
+                  const auto command = message ? fromMessage(*message) : std::nullopt;
+                  if (!command || !mayCommand(message->header, command->engaged)) {
+                    ++rejected_;
+                    return;
+                  }
+                  command_ = {*command, message->header.sequence};
+                });
+  bus.subscribe(channel::kRobot, [this](const std::string&, const void* data, std::uint32_t size) {
+    const auto message = decode<robot_command_t>(data, size);
+    const auto move = message ? fromMessage(*message) : std::nullopt;
+    if (!move) {
+      ++rejected_;
+      return;
+    }
+    moves_.push_back(*move);
+  });
+}
+
+bool PlantLink::mayCommand(const header_t& from, bool engaged) noexcept {
+  const bool master = from.source == master_.source && from.epoch == master_.epoch;
+  if (!master) {
+    // Others wait until the master lets go or falls silent. A controller that is not engaged asks for
+    // nothing, and takes nothing over from one that is.
+    if (engaged_ && now_ - heard_ < kSilence) return false;
+    master_ = {from.source, from.epoch};
+    sequence_ = -2;
+  }
+  if (from.sequence < sequence_) return false;
+  sequence_ = from.sequence;
+  engaged_ = engaged;
+  heard_ = now_;
+  return true;
+}
+
+}  // namespace ves

@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/transport/messages.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <random>
+
+namespace ves {
+namespace {
+
+template <typename Vector, std::size_t N>
+void put(const Vector& from, double (&to)[N]) {
+  static_assert(Vector::RowsAtCompileTime == static_cast<int>(N));
+  for (std::size_t i = 0; i < N; ++i) to[i] = from(static_cast<Eigen::Index>(i));
+}
+
+template <typename T>
+bool inRange(T x, T lo, T hi) {
+  return x >= lo && x <= hi;
+}
+
+constexpr double kMaxJointValue = 1e3;  // [rad | m]
+
+}  // namespace
+
+Identity Identity::draw() {
+  std::random_device random;
+  const auto high = static_cast<std::int64_t>(random() & 0x3fffffffu);
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return {(high << 22) ^ static_cast<std::int64_t>(getpid()),
+          std::chrono::duration_cast<std::chrono::nanoseconds>(now).count()};
+}
+
+header_t header(const Identity& from, std::int64_t sequence, std::int64_t time) noexcept {
+  header_t h;
+  h.time_ns = time;
+  h.sequence = sequence;
+  h.source = from.source;
+  h.epoch = from.epoch;
+  return h;
+}
+
+sample_t toMessage(const Sample& sample, const Identity& from, std::int64_t answers) noexcept {
+  sample_t m;
+  m.header = header(from, sample.sequence, sample.time);
+  m.answers = answers;
+  std::copy(sample.adc.begin(), sample.adc.end(), m.adc);
+  std::copy(sample.legs.begin(), sample.legs.end(), m.legs);
+  m.switches = static_cast<std::int32_t>(sample.switches);
+  put(sample.q, m.q);
+  return m;
+}
+
+leg_command_t toMessage(const LegCommand& command, const header_t& header) noexcept {
+  leg_command_t m;
+  m.header = header;
+  m.engaged = command.engaged ? 1 : 0;
+  m.segment = command.segment;
+  std::copy(command.counts.begin(), command.counts.end(), m.counts);
+  return m;
+}
+
+state_t toMessage(const TickState& state, const TickInput& in, const header_t& header) noexcept {
+  state_t m;
+  m.header = header;
+  m.sample_sequence = state.sample_sequence;
+  m.request = static_cast<std::int32_t>(in.request);
+  m.rival = in.rival ? 1 : 0;
+  m.phase = static_cast<std::int32_t>(state.phase);
+  m.segment = state.segment;
+  m.age = state.age;
+  put(state.total.stacked(), m.total);
+  put(state.fixed.stacked(), m.fixed);
+  put(state.dynamic.stacked(), m.dynamic);
+  put(state.motion.x, m.x);
+  put(state.motion.x_dot, m.x_dot);
+  put(state.motion.x_ddot, m.x_ddot);
+  put(state.due, m.x_due);
+  put(state.legs.L, m.leg);
+  put(state.legs.L_dot, m.leg_dot);
+  put(state.legs.L_ddot, m.leg_ddot);
+  put(state.L_measured, m.leg_measured);
+  put(state.measured.stacked(), m.x_measured);
+  put(state.bias, m.bias);
+  m.tripped = static_cast<std::int32_t>(state.tripped.bits());
+  m.latched = static_cast<std::int32_t>(state.latched.bits());
+  m.cause = static_cast<std::int32_t>(state.cause);
+  m.cause_tick = state.cause_tick;
+  m.engaged = state.command.engaged ? 1 : 0;
+  std::copy(state.command.counts.begin(), state.command.counts.end(), m.counts);
+  return m;
+}
+
+truth_t toMessage(const plant::Truth& truth, const header_t& header) noexcept {
+  truth_t m;
+  m.header = header;
+  put(truth.x.stacked(), m.x);
+  put(truth.P.v, m.v);
+  put(truth.P.w, m.w);
+  put(truth.P.a, m.a);
+  put(truth.P.alpha, m.alpha);
+  put(truth.F_Po_I.stacked(), m.wrench);
+  put(truth.joints.q, m.q);
+  put(truth.joints.q_dot, m.q_dot);
+  put(truth.joints.q_ddot, m.q_ddot);
+  put(truth.legs.L, m.leg);
+  put(truth.legs.L_dot, m.leg_dot);
+  put(truth.current, m.current);
+  m.legs_agree = truth.legs_agree ? 1 : 0;
+  return m;
+}
+
+std::optional<Sample> fromMessage(const sample_t& m) noexcept {
+  Sample s;
+  s.sequence = m.header.sequence;
+  s.time = m.header.time_ns;
+  bool good = s.sequence >= 0;
+  for (std::size_t i = 0; i < s.adc.size(); ++i) {
+    s.adc[i] = m.adc[i];
+    good = good && inRange(m.adc[i], -32768, 32767);
+  }
+  for (std::size_t i = 0; i < s.legs.size(); ++i) {
+    s.legs[i] = m.legs[i];
+    good = good && inRange(m.legs[i], 0, plant::Temposonics::kMaxCount);
+  }
+  for (int i = 0; i < kMaxJoints; ++i) {
+    s.q(i) = m.q[i];
+    good = good && inRange(m.q[i], -kMaxJointValue, kMaxJointValue);
+  }
+  s.switches = static_cast<std::uint32_t>(m.switches) & kAllSwitchesClosed;
+  if (!good) return {};
+  return s;
+}
+
+std::optional<LegCommand> fromMessage(const leg_command_t& m) noexcept {
+  LegCommand c;
+  c.engaged = m.engaged != 0;
+  c.segment = m.segment;
+  bool good = inRange(m.segment, -1, kMaxSegments) && inRange<int>(m.engaged, 0, 1);
+  for (std::size_t i = 0; i < c.counts.size(); ++i) {
+    c.counts[i] = m.counts[i];
+    good = good && inRange(m.counts[i], 0, plant::Temposonics::kMaxCount);
+  }
+  if (!good) return {};
+  return c;
+}
+
+std::optional<plant::RobotMove> fromMessage(const robot_command_t& m) noexcept {
+  if (!inRange(m.joint, 0, kMaxJoints - 1) || !inRange(m.target, -kMaxJointValue, kMaxJointValue) ||
+      !inRange(m.duration, 1e-3, 1e6))
+    return {};
+  return plant::RobotMove{m.joint, m.target, m.duration};
+}
+
+std::optional<Request> fromMessage(const operator_t& m) noexcept {
+  if (!inRange(m.request, 0, 2)) return {};
+  return static_cast<Request>(m.request);
+}
+
+}  // namespace ves
