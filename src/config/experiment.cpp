@@ -357,6 +357,9 @@ Experiment build(const Value& document) {
   c.period = controller.integer("period_ns", 1'000'000, 1'000'000'000);
   c.gentle_speed = controller.number("gentle_speed_m_per_s", 1e-3, 1.0);
   c.gentle_rotation = controller.number("gentle_rotation_deg_per_s", 1e-1, 100.0) * kDegree;
+  c.gentle_braking = controller.number("gentle_braking_m_per_s2", 1e-3, 10.0);
+  c.gentle_rotation_braking =
+      controller.number("gentle_rotation_braking_deg_per_s2", 1e-1, 1e3) * kDegree;
   c.arming_samples = static_cast<int>(controller.integer("arming_samples", 1, 10'000));
   controller.finish();
 

@@ -36,20 +36,7 @@ class Loader {
   Loader(const std::string& text, const std::string& file) : text_(text), file_(file) {}
 
   UrdfRobot load() {
-    urdf::ModelInterfaceSharedPtr urdf;
-    {
-      Messages messages;
-      try {
-        urdf = urdf::parseURDF(text_);
-      } catch (const std::exception& error) {
-        throw InputError(fmt::format("{}:1: not a URDF: {}", file_, error.what()));
-      }
-      if (!urdf) {
-        std::replace(messages.first.begin(), messages.first.end(), '\n', ' ');
-        throw InputError(fmt::format("{}:{}: not a usable URDF: {}", file_,
-                                     lineOfQuoted(messages.first), messages.first));
-      }
-    }
+    const urdf::ModelInterfaceSharedPtr urdf = parse();
     const urdf::Link* link = urdf->getRoot().get();
     addBody(*link, Transform{});
     Transform X_body_link;  // of a fixed link in the body that carries it
@@ -76,6 +63,22 @@ class Loader {
   }
 
  private:
+  urdf::ModelInterfaceSharedPtr parse() const {
+    Messages messages;
+    urdf::ModelInterfaceSharedPtr urdf;
+    try {
+      urdf = urdf::parseURDF(text_);
+    } catch (const std::exception& error) {
+      messages.first = error.what();
+    }
+    // urdfdom goes on with zeros after some errors; an error is an error.
+    if (urdf && messages.first.empty() && urdf->getRoot()) return urdf;
+    std::string what = messages.first.empty() ? "has no root link" : messages.first;
+    std::replace(what.begin(), what.end(), '\n', ' ');
+    throw InputError(
+        fmt::format("{}:{}: not a usable URDF: {}", file_, lineOfQuoted(what), what));
+  }
+
   void addJoint(const urdf::Joint& joint, const Transform& X_parent) {
     if (robot_.model.joints == kMaxJoints)
       refuse("joint", joint.name, fmt::format("one too many, at most {} may move", kMaxJoints));

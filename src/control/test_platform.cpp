@@ -77,7 +77,7 @@ void TestPlatform::readSample(const TickInput& in) noexcept {
   const Sample& sample = in.sample;
   const bool fresh = sample.sequence > state_.sample_sequence;
   state_.age = fresh ? 0 : state_.age + 1;
-  fresh_ticks_ = fresh ? fresh_ticks_ + 1 : 0;
+  fresh_ticks_ = fresh && !in.rival ? fresh_ticks_ + 1 : 0;
   state_.tick = in.tick;
   state_.sample_sequence = sample.sequence;
 
@@ -160,14 +160,30 @@ void TestPlatform::beginSegment() noexcept {
   }
 }
 
-/// A quintic from the present position and rate to rest at `target`; 0 s: as long as is gentle.
+/// To rest where braking at a gentle rate ends, then by a quintic to `target`; 0 s: as long as is
+/// gentle.
 void TestPlatform::beginMove(const Vec6& target, double duration) noexcept {
-  PathPoint<6> from = state_.motion;
-  from.x_ddot.setZero();
-  if (duration <= 0.0) duration = gentleDuration(from.x, target);
-  move_ = Quintic<6>(from, target, duration);
+  const Vec6& x = state_.motion.x;
+  const Vec6& v = state_.motion.x_dot;
+  const double brake_time = std::max(v.head<3>().norm() / config_.gentle_braking,
+                                     v.tail<3>().norm() / config_.gentle_rotation_braking);
+  brake_ = Quintic<6>();
+  Vec6 rest = x;
+  if (brake_time > 0.0) {
+    rest += 0.5 * brake_time * v;
+    PathPoint<6> from = atRest(x);
+    from.x_dot = v;
+    brake_ = Quintic<6>(from, rest, brake_time);
+  }
+  if (duration <= 0.0) duration = gentleDuration(rest, target);
+  move_ = Quintic<6>(atRest(rest), target, duration);
   n_ = 0;
-  steps_ = static_cast<std::int64_t>(std::ceil(duration / period_));
+  steps_ = static_cast<std::int64_t>(std::ceil((brake_time + duration) / period_));
+}
+
+PathPoint<6> TestPlatform::moveAt(std::int64_t n) const noexcept {
+  const double t = static_cast<double>(n) * period_;
+  return t < brake_.duration() ? brake_.at(t) : move_.at(t - brake_.duration());
 }
 
 double TestPlatform::gentleDuration(const Vec6& from, const Vec6& to) const noexcept {
@@ -182,7 +198,7 @@ PathPoint<6> TestPlatform::nextMotion(const Sample& sample) noexcept {
     case Phase::kArmed:
       return atRest(state_.measured.stacked());
     case Phase::kReturning:
-      return move_.at(static_cast<double>(n_++) * period_);
+      return moveAt(n_++);
     case Phase::kParked:
     case Phase::kStopped:
       return atRest(state_.motion.x);
@@ -200,7 +216,7 @@ PathPoint<6> TestPlatform::nextMotion(const Sample& sample) noexcept {
       }
       return atRest(state_.motion.x);
     case SegmentKind::kMove:
-      return move_.at(static_cast<double>(n) * period_);
+      return moveAt(n);
     case SegmentKind::kTrajectory:
       return trajectoryGeneration(segment().trajectory, segment_start_, n, steps_, period_);
     case SegmentKind::kAdmittance:

@@ -45,8 +45,8 @@ class Page {
         "set output {}\n"
         "set multiplot layout {},{} title {} font 'DejaVu Sans,13' margins 0.06,0.985,{},0.90 "
         "spacing 0.06,0.09\n"
-        "set grid lc rgb '#dddddd' lw 1\nset border 3 lc rgb '#555555'\nset tics nomirror\n"
-        "set key top right horizontal samplen 2 font 'DejaVu Sans,11'\nset xrange [{}:{}]\n"
+        "set grid lc rgb '#cccccc' lw 1 dt 1\nset border 3 lc rgb '#555555'\nset tics nomirror\n"
+        "set key top right horizontal samplen 2 width 3 font 'DejaVu Sans,11'\nset xrange [{}:{}]\n"
         "set offsets graph 0,0,0.18,0.05\n",
         rows == 1 ? 480 : 800, quoted(file), rows, cols, quoted(title), rows == 1 ? 0.14 : 0.085,
         span.from, span.to);
@@ -90,7 +90,8 @@ std::vector<std::filesystem::path> drawPlots(const Series& series,
     if (in(row, Phase::kRunning) && row.state.segment >= 0 &&
         experiment.controller.program.segments[static_cast<std::size_t>(row.state.segment)].kind ==
             SegmentKind::kCalibration)
-      calibrated.from = row.t;
+      calibrated.from = row.t + 2.0 * static_cast<double>(experiment.controller.period) *
+                                    kSecondPerNanosecond;  // the bias counts from the next tick
   }
 
   const double mm = 1e3, degrees = 1.0 / kDegree;

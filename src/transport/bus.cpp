@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-#include <cstring>
+#include <cstdio>
 
 #include "ves/config/document.hpp"
 #include "ves/transport/channels.hpp"
@@ -13,6 +13,19 @@ namespace {
 
 // Ten samples wait at each tick in the worst case; a stalled controller must still find the newest.
 constexpr int kQueue = 4096;  // [-] messages
+
+/// LCM itself would print, and go on with part of an address.
+const std::string& checked(const std::string& url) {
+  unsigned a, b, c, d, port;
+  int end = 0;
+  const int read = std::sscanf(url.c_str(), "udpm://%3u.%3u.%3u.%3u:%5u%n", &a, &b, &c, &d, &port, &end);
+  const std::string rest = url.substr(static_cast<std::size_t>(end));
+  if (read != 5 || end == 0 || a < 224 || a > 239 || b > 255 || c > 255 || d > 255 || port < 1 ||
+      port > 65535 || !(rest.empty() || rest.rfind("?ttl=", 0) == 0))
+    throw InputError(fmt::format("--url {}: want udpm://MULTICAST-ADDRESS:PORT[?ttl=N], for example {}",
+                                 url, kDefaultUrl));
+  return url;
+}
 
 /// One message to ourselves, within two seconds.
 bool echoes(lcm::LCM& lcm) {
@@ -33,7 +46,7 @@ bool echoes(lcm::LCM& lcm) {
 
 }  // namespace
 
-Bus::Bus(const std::string& url) : lcm_(url) {
+Bus::Bus(const std::string& url) : lcm_(checked(url)) {
   if (!lcm_.good()) throw InputError(fmt::format("--url {}: not a bus that LCM can open", url));
   if (!echoes(lcm_))
     throw InputError(
@@ -60,7 +73,7 @@ void Bus::drain() noexcept {
 bool Bus::wait(int milliseconds) noexcept { return lcm_.handleTimeout(milliseconds) > 0; }
 
 bool busWorks(const std::string& url) {
-  lcm::LCM lcm(url);
+  lcm::LCM lcm(checked(url));
   return lcm.good() && echoes(lcm);
 }
 

@@ -71,8 +71,10 @@ struct ControllerConfig {
   LegCodec legs;
   SafetyLimits safety;
   Program program;
-  double gentle_speed = 0.05;      // [m/s] peak, of the return and the first approach
+  double gentle_speed = 0.05;      // [m/s] peak, of moves and the return
   double gentle_rotation = 0.10;   // [rad/s] peak
+  double gentle_braking = 1.5;     // [m/s^2] mean, when one begins in motion
+  double gentle_rotation_braking = 2.5;  // [rad/s^2] mean
   int arming_samples = 10;         // [-] consecutive ticks with a new sample before arming
 };
 
@@ -137,6 +139,7 @@ class TestPlatform {
   Tripped safetyChecks(const TickInput& in, const PathPoint<6>& next, const BodyMotion& P,
                        const LegMotion& legs) const noexcept;
   void trip(Tripped tripped) noexcept;
+  PathPoint<6> moveAt(std::int64_t n) const noexcept;
   double gentleDuration(const Vec6& from, const Vec6& to) const noexcept;
 
   ControllerConfig config_;
@@ -148,12 +151,12 @@ class TestPlatform {
   TickState state_;
   Transform X_IP_measured_;
   bool legs_solved_ = false;         // forward kinematics found the pose of this sample
-  int fresh_ticks_ = 0;              // [-] consecutive ticks with a new sample
+  int fresh_ticks_ = 0;              // [-] consecutive ticks with a new sample and no rival
   bool start_requested_ = false;
   std::int64_t n_ = 0;               // [-] ticks of the segment (or the return) so far
   std::int64_t steps_ = 0;           // [-] periods that it lasts
   Vec6 segment_start_ = Vec6::Zero();
-  Quintic<6> move_;
+  Quintic<6> brake_, move_;          // one after the other
 };
 
 }  // namespace ves

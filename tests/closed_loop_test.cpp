@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Controller and plant together, in lockstep: what a run must show.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "ves/report/series.hpp"
+#include "ves/report/summary.hpp"
+#include "ves/run/run.hpp"
+
+namespace ves {
+namespace {
+
+namespace fs = std::filesystem;
+
+class ClosedLoop : public testing::Test {
+ protected:
+  void SetUp() override {
+    log_ = fs::temp_directory_path() / ("ves_loop_" + std::to_string(getpid()) + ".lcmlog");
+  }
+  void TearDown() override { fs::remove(log_); }
+
+  static Experiment experiment(const std::string& name, const std::vector<std::string>& set = {}) {
+    return loadExperiment(std::string(VES_TEST_CONFIG_DIR) + "/scenarios/" + name + ".yaml", set);
+  }
+  Series run(const Experiment& e) {
+    {
+      LogWriter writer(log_.string());
+      result_ = runLockstep(e, &writer, nullptr);
+    }
+    return readSeries(log_.string());
+  }
+  std::string bytes() {
+    std::ifstream in(log_, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+  }
+  fs::path log_;
+  RunResult result_;
+};
+
+bool in(const Row& row, int segment) {
+  return row.state.phase == static_cast<int>(Phase::kRunning) && row.state.segment == segment;
+}
+
+TEST_F(ClosedLoop, EveryScenarioParks) {
+  for (const auto& entry :
+       fs::directory_iterator(fs::path(VES_TEST_CONFIG_DIR) / "scenarios")) {
+    const RunResult result = runLockstep(loadExperiment(entry.path()), nullptr, nullptr);
+    EXPECT_EQ(result.phase, Phase::kParked) << entry.path() << " " << name(result.cause);
+  }
+}
+
+TEST_F(ClosedLoop, FreeDecayIsSixClosedFormOscillators) {  // Table 4.1, 4.2.2
+  const Series series = run(experiment("free_decay"));
+  const double m[] = {500, 500, 500, 250, 250, 250}, c[] = {500, 500, 500, 250, 250, 250},
+               k[] = {1500, 2500, 4000, 1500, 1000, 2000};
+  const double offset[] = {0.10, -0.08, 0.06, 8 * kDegree, -6 * kDegree, 10 * kDegree};
+  std::int64_t n = 0;
+  for (const Row& row : series.rows) {
+    if (!in(row, 3)) continue;
+    const double t = 0.01 * static_cast<double>(++n);
+    for (int i = 0; i < 6; ++i) {
+      const double decay = c[i] / m[i] / 2, wd = std::sqrt(k[i] / m[i] - decay * decay);
+      const double x = offset[i] * std::exp(-decay * t) *
+                       (std::cos(wd * t) + decay / wd * std::sin(wd * t));
+      ASSERT_NEAR(row.state.x[i], x, 1e-9 * std::abs(offset[i])) << "coordinate " << i << " t " << t;
+    }
+  }
+  EXPECT_EQ(n, 800);
+}
+
+TEST_F(ClosedLoop, ZSineErrsAsTheServosGainsAndDelaysSay) {  // 4.2.1
+  const Series series = run(experiment("z_sine"));
+  const auto summary = summarise(series, result_);
+  const double extending = summary["z_error_max_extending_m"];
+  const double retracting = summary["z_error_max_retracting_m"];
+  // The linear estimate, v/Kv for the peak rate with the loop's second pole, is 35.7 and 53.7 mm. What
+  // the machine adds is delay: half a controller period of hold (5.0 ms), half an update of the
+  // LegSlave (0.5 ms) and the age of its averaged reading (0.17 ms), at 0.628 m/s.
+  const double delay = 0.628 * (5.0e-3 + 0.51e-3 + 0.17e-3);  // 3.6 mm
+  EXPECT_NEAR(extending, 35.7e-3 + delay, 1.5e-3);
+  EXPECT_NEAR(retracting, 53.7e-3 + delay, 1.5e-3);
+}
+
+/// The conditioner's filter by Runge-Kutta, driven by straight lines: nothing of ours in it.
+class SecondOrderFilter {
+ public:
+  Vec3 step(const Vec3& u, double dt) {
+    const double w = 2 * M_PI * 20.0;
+    const Vec3 u0 = u_, u1 = u;
+    const auto f = [&](const Vec3& y, const Vec3& v, double s) {
+      return Vec3(w * w * (u0 + s * (u1 - u0) - y) - M_SQRT2 * w * v);
+    };
+    const Vec3 k1 = v_, l1 = f(y_, v_, 0.0);
+    const Vec3 k2 = v_ + dt / 2 * l1, l2 = f(y_ + dt / 2 * k1, k2, 0.5);
+    const Vec3 k3 = v_ + dt / 2 * l2, l3 = f(y_ + dt / 2 * k2, k3, 0.5);
+    const Vec3 k4 = v_ + dt * l3, l4 = f(y_ + dt * k3, k4, 1.0);
+    y_ += dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4);
+    v_ += dt / 6 * (l1 + 2 * l2 + 2 * l3 + l4);
+    u_ = u;
+    return y_;
+  }
+
+ private:
+  Vec3 u_ = Vec3::Zero(), y_ = Vec3::Zero(), v_ = Vec3::Zero();
+};
+
+TEST_F(ClosedLoop, GravityCompensationLeavesQuantisationAndFilterLag) {
+  const Experiment e = experiment("puma_tilt");
+  const double weight = 9.81 * (52.45 + 16.0 + 5.0);
+  const Vec3 weight_I(0.0, 0.0, -weight);
+  // Quantisation: half an A/D count on each channel twice (reading and calibration), and half a
+  // Temposonics count on each leg, which tilts the believed gravity. Worst cases, added up.
+  const double quantisation = e.controller.sensor.C_proc.topRows<3>().cwiseAbs().rowwise().sum().norm() +
+                              weight * 2 * 0.5 * e.plant.transducer.scale / 0.5;  // legs 0.5 m apart
+  // Filter lag: the filter is sqrt(2)/(2 pi 20 Hz) = 11.25 ms late, so it shows the weight as it stood
+  // then, in axes that have turned since: weight * rate * 11.25 ms.
+  const double lag = M_SQRT2 / (2 * M_PI * 20.0);
+
+  TestPlatform platform(e.controller);
+  plant::Plant plant(e.plant);
+  SecondOrderFilter filter;  // of the force that accelerates the payload: real, not a residual
+  TickInput in;
+  in.request = Request::kStart;
+  double still = 0.0, moving = 0.0, allowed = 0.0;
+  std::int64_t still_since = 0;
+  for (; !platform.done(); ++in.tick) {
+    Vec3 inertial = Vec3::Zero();
+    for (int k = 1; k <= 20; ++k) {
+      in.sample = plant.sample();
+      const plant::Truth& truth = plant.truth();
+      const Mat3 R_PI = truth.P.X.R.transpose();
+      if (plant.time() > 0) inertial = filter.step(R_PI * (truth.F_Po_I.f - weight_I), 0.5e-3);
+      if (k == 1) {
+        const TickState& state = platform.tick(in);
+        plant.command(state.command);
+        if (state.motion.x_dot.norm() > 0.0) still_since = in.tick;
+        if (state.phase == Phase::kRunning && state.segment >= 2) {
+          const double left = (state.dynamic.f - truth.P.X.R * inertial).norm();
+          const double lagging = weight * truth.P.w.norm() * lag;
+          if (in.tick - still_since > 70) {
+            still = std::max(still, left);
+          } else {
+            moving = std::max(moving, left);
+            allowed = std::max(allowed, lagging);
+            ASSERT_LT(left, 1.25 * allowed + quantisation) << "tick " << in.tick;
+          }
+        }
+      }
+      plant.advance(in.tick * 10'000'000 + k * 500'000);
+    }
+  }
+  std::printf("residual force: still %.3f N (quantisation allows %.3f), tilting %.3f N (filter lag "
+              "%.3f)\n", still, quantisation, moving, allowed);
+  EXPECT_LT(still, quantisation);
+  EXPECT_GT(moving, 0.75 * allowed);
+}
+
+TEST_F(ClosedLoop, SameSeedSameBytes) {
+  const Experiment e = experiment("puma_on_table_4_1", {"seed=42"});
+  run(e);
+  const std::string first = bytes();
+  run(e);
+  EXPECT_TRUE(first == bytes());
+  run(experiment("puma_on_table_4_1", {"seed=43"}));
+  EXPECT_FALSE(first == bytes());
+}
+
+TEST_F(ClosedLoop, ReachesTheBaseItEmulatesUnderAConstantForce) {
+  // A payload that gravity compensation does not know is a constant force; the base must settle where
+  // its springs hold it: x = F/K. The arm holds still, the difference is 5 kg more in the plant.
+  Experiment e = experiment("puma_on_table_4_1",
+                            {"program=[{move: {}}, {admittance: {duration_s: 25}}]", "sensor.noise=false",
+                             "sensor.bias_v=[0,0,0,0,0,0]"});
+  RigidBody stone;
+  stone.mass = 5.0;
+  e.plant.payload.adapter_R = combine(e.plant.payload.adapter_R, {}, stone);
+  std::int64_t ticks = 0;
+  Vec6 x = Vec6::Zero();
+  runLockstep(e, nullptr, [&](const TickState& state) {
+    if (state.phase == Phase::kRunning && state.segment == 1) {
+      ++ticks;
+      x = state.motion.x;
+    }
+    return Request::kNone;
+  });
+  EXPECT_EQ(ticks, 2500);
+  EXPECT_NEAR(x(2), -5.0 * 9.81 / 4000.0, 2e-4);
+}
+
+TEST_F(ClosedLoop, RatesFrom75HertzOnStayTrueToTheModel) {
+  // The free decay at another controller rate: the model is discretised for it.
+  for (const char* period : {"13333333", "10000000", "5000000", "2000000"}) {
+    const Series series =
+        run(experiment("free_decay", {std::string("controller.period_ns=") + period}));
+    const double T = std::stod(period) * 1e-9;
+    std::int64_t n = 0;
+    for (const Row& row : series.rows) {
+      if (!in(row, 3)) continue;
+      const double t = T * static_cast<double>(++n), wd = std::sqrt(3.0 - 0.25);
+      ASSERT_NEAR(row.state.x[0],
+                  0.10 * std::exp(-0.5 * t) * (std::cos(wd * t) + 0.5 / wd * std::sin(wd * t)), 1e-10);
+    }
+    EXPECT_GT(n, 500);
+  }
+}
+
+TEST_F(ClosedLoop, SwitchStopsTheRunAndLeavesItsName) {
+  const Series series = run(experiment(
+      "z_sine", {"program=[{move: {}}, {trajectory: {duration_s: 3, z: {sine: {amplitude_m: 0.1, "
+                 "frequency_hz: 0.5}}}, switches: [{at_s: 1.0, duration_s: 0.2, switch: floor_mat}]}]"}));
+  EXPECT_FALSE(result_.good());
+  EXPECT_EQ(result_.cause, Check::kFloorMat);
+  const auto summary = summarise(series, result_);
+  EXPECT_EQ(summary["trips"][0], "floor mat");
+  // The loop opened at 1.0 s after the segment's first command; the tick that saw it is the next.
+  std::int64_t segment_tick = -1;
+  for (const Row& row : series.rows)
+    if (in(row, 1) && segment_tick < 0) segment_tick = row.state.header.sequence;
+  EXPECT_LE(result_.cause_tick, segment_tick + 101);
+  EXPECT_GE(result_.cause_tick, segment_tick + 100);
+}
+
+TEST_F(ClosedLoop, StopRequestEndsParked) {
+  int ticks = 0;
+  const RunResult result = runLockstep(experiment("puma_on_table_4_1"), nullptr, [&](const TickState&) {
+    return ++ticks == 900 ? Request::kStop : Request::kNone;
+  });
+  EXPECT_TRUE(result.good());
+  EXPECT_LT(result.ticks, 1300);
+}
+
+TEST_F(ClosedLoop, SeriesHasARowATickAndAColumnANumber) {
+  const Series series = run(experiment("puma_on_table_4_1"));
+  EXPECT_EQ(static_cast<std::int64_t>(series.rows.size()), result_.ticks);
+  for (const Row& row : series.rows) ASSERT_TRUE(row.has_truth);
+  const auto all = columns(series.experiment);
+  std::set<std::string> names;
+  for (const Column& column : all) names.insert(column.name);
+  EXPECT_EQ(names.size(), all.size());
+  for (const char* name : {"t_s", "z_actual_m", "fx_dynamic_n", "leg6_measured_m", "joint_6_rad"})
+    EXPECT_TRUE(names.count(name)) << name;
+}
+
+}  // namespace
+}  // namespace ves

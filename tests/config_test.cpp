@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "support/robots.hpp"
+#include "ves/config/experiment.hpp"
+
+namespace ves {
+namespace {
+
+namespace fs = std::filesystem;
+
+fs::path scenarios() { return fs::path(test::configDir()) / "scenarios"; }
+
+std::string refusal(const std::function<void()>& read) {
+  try {
+    read();
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Config, EveryScenarioLoads) {
+  int count = 0;
+  for (const auto& entry : fs::directory_iterator(scenarios())) {
+    const Experiment e = loadExperiment(entry.path());
+    EXPECT_EQ(e.name, entry.path().stem());
+    EXPECT_GT(e.substitutes, 0);
+    ++count;
+  }
+  EXPECT_GE(count, 7);
+}
+
+TEST(Config, ResolvedTextReadsBackToTheSameExperiment) {
+  for (const auto& entry : fs::directory_iterator(scenarios())) {
+    const Experiment e = loadExperiment(entry.path());
+    const Experiment back = parseExperiment(e.resolved, "resolved");
+    EXPECT_EQ(back.resolved, e.resolved);
+    EXPECT_EQ(back.hash, e.hash);
+    EXPECT_EQ(back.controller.sensor.C_proc, e.controller.sensor.C_proc);
+    EXPECT_EQ(back.controller.program.size, e.controller.program.size);
+    EXPECT_EQ(back.joint_names, e.joint_names);
+  }
+}
+
+TEST(Config, EveryMachineNumberIsTheReportsOrTagged) {
+  // Keys whose untagged numbers are in the report, or are a choice of the experiment.
+  const std::set<std::string> report = {
+      "schema", "seed", "gravity_m_per_s2", "period_ns", "K_P", "K_D", "gain_extend_in_per_s_per_ma",
+      "gain_retract_in_per_s_per_ma", "tau_s", "counts_per_in", "filters", "filter_cutoff_rad_per_s",
+      "cutoff_hz", "noise", "translation_m", "rotation_deg", "mass_diagonal", "damping_diagonal",
+      "stiffness_diagonal"};
+  const std::function<void(const Value&, const std::string&, bool)> check =
+      [&](const Value& value, const std::string& key, bool tagged) {
+        tagged = tagged || !value.tag.empty();
+        if (value.kind == Value::Kind::kScalar) {
+          EXPECT_TRUE(tagged || report.count(key)) << key << " has no tag";
+        }
+        for (std::size_t i = 0; i < value.children.size(); ++i)
+          check(value.children[i], value.kind == Value::Kind::kMap ? value.keys[i] : key, tagged);
+      };
+  check(loadDocument(fs::path(test::configDir()) / "ves.yaml"), "", false);
+}
+
+// --- Bad input: one line with file, line, key and what is allowed --------------------------------
+
+struct Bad {
+  const char* name;
+  const char* scenario;
+  const char* override;
+  const char* says;  // must be in the message
+};
+std::ostream& operator<<(std::ostream& out, const Bad& bad) { return out << bad.name; }
+
+class BadValue : public testing::TestWithParam<Bad> {};
+
+TEST_P(BadValue, IsRefusedByName) {
+  const Bad& bad = GetParam();
+  const std::string message = refusal(
+      [&] { loadExperiment(scenarios() / (std::string(bad.scenario) + ".yaml"), {bad.override}); });
+  EXPECT_NE(message.find(bad.says), std::string::npos) << message;
+  EXPECT_EQ(message.find('\n'), std::string::npos) << message;
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Values, BadValue,
+    testing::Values(
+        Bad{"unknown_key", "z_sine", "legs.tau_ms=6.4", "legs.tau_ms: unknown key"},
+        Bad{"hint", "z_sine", "legs.filter=none", "legs.filter: unknown key"},
+        Bad{"nan", "z_sine", "legs.tau_s=nan", "legs.tau_s: 'nan', want a number in [1e-06, 1]"},
+        Bad{"infinite", "z_sine", "platform.home_height_m=inf", "platform.home_height_m: 'inf'"},
+        Bad{"with_unit", "z_sine", "legs.tau_s=6.4 ms", "legs.tau_s: '6.4 ms', want a number"},
+        Bad{"typo", "z_sine", "legs.tau_s=0.0o64", "legs.tau_s: '0.0o64'"},
+        Bad{"negative_tau", "z_sine", "legs.tau_s=-1", "legs.tau_s: '-1'"},
+        Bad{"zero_period", "z_sine", "controller.period_ns=0", "want a whole number in [1000000,"},
+        Bad{"period_not_whole", "z_sine", "controller.period_ns=1e7", "want a whole number"},
+        Bad{"short_vector", "z_sine", "sensor.gain=[1000, 1000]", "has 2 entries, want 6"},
+        Bad{"scalar_for_vector", "z_sine", "sensor.gain=1000", "want a list of 6 numbers"},
+        Bad{"map_for_number", "z_sine", "legs.tau_s={a: 1}", "is a map, want a number"},
+        Bad{"wrong_rows", "z_sine", "sensor.sensitivity_uv_per_v=[[1]]", "want 6 rows of 6"},
+        Bad{"singular_sensor", "z_sine", "sensor.excitation_v=0", "sensor.excitation_v: '0'"},
+        Bad{"indefinite_mass", "z_sine", "base.mass_diagonal=[500, 500, 500, 250, 250, -1]",
+            "base.mass_diagonal: smallest eigenvalue -1, want all above 0"},
+        Bad{"zero_mass", "z_sine", "base.mass_diagonal=[500, 500, 500, 250, 250, 0]",
+            "positive definite"},
+        Bad{"negative_stiffness", "z_sine", "base.stiffness_diagonal=[-1, 0, 0, 0, 0, 0]",
+            "base.stiffness_diagonal: smallest eigenvalue -1, want none below 0"},
+        Bad{"negative_damping", "z_sine", "base.damping_diagonal=[0, 0, 0, 0, 0, -5]",
+            "positive semidefinite"},
+        Bad{"choice", "z_sine", "legs.filters=all", "legs.filters: 'all', want one of none, outputs"},
+        Bad{"flag", "z_sine", "sensor.noise=yes", "sensor.noise: 'yes', want one of true, false"},
+        Bad{"stroke_outside_transducer", "z_sine", "legs.offset_m=1.3", "14-bit transducer"},
+        Bad{"initial_pose_out_of_reach", "z_sine", "initial_pose.z_m=0.9", "initial_pose: takes legs"},
+        Bad{"joint_outside_limits", "puma_tilt", "robot.joints_deg_or_m=[0, 90, 0, 0, 0, 0]",
+            "joint 'joint_2' at 90, want [-225, 45] deg"},
+        Bad{"joint_count", "puma_tilt", "robot.joints_deg_or_m=[0]", "has 1 entries, want 6"},
+        Bad{"no_such_section", "z_sine", "robots.urdf_text=x", "robots: unknown key"},
+        Bad{"empty_program", "z_sine", "program=[]", "program: has 0 segments"},
+        Bad{"unknown_segment", "z_sine", "program=[{dance: {}}]", "program[0].dance: unknown"},
+        Bad{"two_kinds", "z_sine", "program=[{move: {}, calibration: {}}]", "want only one of them"},
+        Bad{"sine_without_frequency", "z_sine",
+            "program=[{trajectory: {duration_s: 1, x: {sine: {amplitude_m: 0.1}}}}]",
+            "program[0].trajectory.x.sine.frequency_hz: missing"},
+        Bad{"angle_in_metres", "z_sine",
+            "program=[{trajectory: {duration_s: 1, alpha: {ramp: {to_m: 0.1}}}}]", "to_deg: missing"},
+        Bad{"robot_event_without_robot", "z_sine",
+            "program=[{move: {}, robot: [{at_s: 0, duration_s: 1, joint: a, to_deg_or_m: 1}]}]",
+            "there is no robot"},
+        Bad{"unknown_joint", "puma_tilt",
+            "program=[{move: {}, robot: [{at_s: 0, duration_s: 1, joint: elbow, to_deg_or_m: 1}]}]",
+            "joint: 'elbow', want one of joint_1, joint_2"},
+        Bad{"schema", "z_sine", "schema=2", "schema: '2'"},
+        Bad{"override_without_value", "z_sine", "seed", "--set seed: want key.path=value"},
+        Bad{"tag", "z_sine", "seed=!guess 4", "tag !guess"}),
+    [](const auto& test) { return std::string(test.param.name); });
+
+class BadFile : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() /
+              ("ves_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()) +
+               std::to_string(getpid()));
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+  fs::path write(const std::string& name, const std::string& text) {
+    std::ofstream(folder_ / name) << text;
+    return folder_ / name;
+  }
+  std::string load(const std::string& text) {
+    const fs::path file = write("a.yaml", text);
+    return refusal([&] { loadExperiment(file); });
+  }
+  fs::path folder_;
+};
+
+TEST_F(BadFile, NamesFileAndLine) {
+  const std::string base = "from: " + (fs::path(test::configDir()) / "ves.yaml").string() + "\n";
+  EXPECT_EQ(load(base + "name: a\ndescription: b\nprogram:\n  - move: {}\nlegs:\n  tau_s: 7\n"),
+            (folder_ / "a.yaml").string() + ":7: legs.tau_s: '7', want a number in [1e-06, 1]");
+  EXPECT_EQ(load(base + "name: a\ndescription: b\nprogram:\n  - move: {}\nsede: 3\n")
+                .rfind((folder_ / "a.yaml").string() + ":6: sede: unknown key", 0), 0u);
+}
+
+TEST_F(BadFile, AsymmetryNamesTheEntries) {
+  const std::string scenario = (scenarios() / "z_sine.yaml").string();
+  std::string rows;
+  for (int i = 0; i < 6; ++i) {
+    rows += "    - [";
+    for (int j = 0; j < 6; ++j)
+      rows += std::string(j ? ", " : "") + (i == j ? "500" : i == 0 && j == 1 ? "1" : "0");
+    rows += "]\n";
+  }
+  const std::string machine = test::readText(test::configDir() + "/ves.yaml");
+  const std::string text = machine.substr(0, machine.find("base:\n")) + "base:\n  mass:\n" + rows +
+                           "  damping_diagonal: [0, 0, 0, 0, 0, 0]\n"
+                           "  stiffness_diagonal: [0, 0, 0, 0, 0, 0]\n"
+                           "initial_pose: {}\nname: a\ndescription: b\nprogram: [{move: {}}]\n";
+  EXPECT_NE(load(text).find("base.mass: not symmetric: entry [1][0] is 0, [0][1] is 1"),
+            std::string::npos) << load(text);
+}
+
+TEST_F(BadFile, SaysWhatIsNotYaml) {
+  EXPECT_NE(load("a: [1, 2\nb: 3\n").find("not YAML"), std::string::npos);
+  EXPECT_NE(load("- 1\n- 2\n").find("want a map of keys"), std::string::npos);
+  EXPECT_NE(load("").find("want a map of keys"), std::string::npos);
+  EXPECT_NE(load("a: 1\na: 2\n").find("a: given twice"), std::string::npos);
+  EXPECT_NE(refusal([&] { loadExperiment(folder_ / "none.yaml"); }).find("no such file"),
+            std::string::npos);
+  EXPECT_NE(refusal([&] { loadExperiment(folder_); }).find("not a file"), std::string::npos);
+}
+
+TEST_F(BadFile, StopsAtFilesThatNameEachOther) {
+  write("b.yaml", "from: a.yaml\n");
+  EXPECT_NE(load("from: b.yaml\n").find("in a circle"), std::string::npos);
+}
+
+TEST_F(BadFile, StopsAtAliasesThatMultiply) {
+  std::string text = "a0: &a0 [1,1,1,1,1,1,1,1,1,1]\n";
+  for (int i = 1; i < 8; ++i) {
+    text += fmt::format("a{}: &a{} [", i, i);
+    for (int k = 0; k < 10; ++k) text += fmt::format("{}*a{}", k ? "," : "", i - 1);
+    text += "]\n";
+  }
+  EXPECT_NE(load(text).find("more than"), std::string::npos);
+}
+
+// --- URDF ----------------------------------------------------------------------------------------
+
+std::string link(const std::string& name, const std::string& inertia = "0.1") {
+  return "<link name=\"" + name + "\">\n<inertial><mass value=\"1\"/><inertia ixx=\"" + inertia +
+         "\" iyy=\"0.1\" izz=\"0.1\" ixy=\"0\" ixz=\"0\" iyz=\"0\"/></inertial></link>\n";
+}
+std::string joint(const std::string& name, const std::string& parent, const std::string& child,
+                  const std::string& type = "revolute") {
+  return "<joint name=\"" + name + "\" type=\"" + type + "\">\n<parent link=\"" + parent +
+         "\"/><child link=\"" + child + "\"/><axis xyz=\"0 0 1\"/>"
+         "<limit lower=\"-1\" upper=\"1\" effort=\"1\" velocity=\"1\"/></joint>\n";
+}
+std::string urdf(const std::string& body) {
+  return "<?xml version=\"1.0\"?>\n<robot name=\"r\">\n" + body + "</robot>\n";
+}
+std::string urdfRefusal(const std::string& text) {
+  return refusal([&] { loadUrdf(text, "r.urdf"); });
+}
+
+TEST(Urdf, AcceptsAnySerialArm) {
+  const UrdfRobot robot = loadUrdf(
+      urdf(link("a") + link("b") + link("c") + link("tool") + joint("j1", "a", "b", "prismatic") +
+           joint("j2", "b", "c", "continuous") + joint("f", "c", "tool", "fixed")),
+      "r.urdf");
+  EXPECT_EQ(robot.model.joints, 2);
+  EXPECT_EQ(robot.model.link(0).type, JointType::kPrismatic);
+  EXPECT_EQ(robot.model.link(1).type, JointType::kRevolute);
+  EXPECT_DOUBLE_EQ(robot.model.link(1).body.mass, 2.0);  // the tool is counted in
+  EXPECT_TRUE(robot.warnings.empty());
+}
+
+TEST(Urdf, WarnsAboutInertiasThatNoRigidBodyHas) {
+  const UrdfRobot puma = test::robot("puma560");
+  ASSERT_EQ(puma.warnings.size(), 2u);  // links 1 and 3
+  EXPECT_NE(puma.warnings[1].find("link 'link_3'"), std::string::npos);
+  EXPECT_NE(puma.warnings[1].find("puma560.urdf:"), std::string::npos);
+  EXPECT_NE(test::robot("doss").warnings[0].find("link 'link_3'"), std::string::npos);
+}
+
+TEST(Urdf, RefusesWithFileLineAndName) {
+  EXPECT_EQ(urdfRefusal(urdf(link("a") + link("b") + link("c") + joint("j1", "a", "b") +
+                             joint("j2", "a", "c"))),
+            "r.urdf:3: link 'a': carries 2 joints, want a serial arm without branches");
+  EXPECT_EQ(urdfRefusal(urdf(link("a") + "<link name=\"b\"/>\n" + joint("j1", "a", "b"))),
+            "r.urdf:5: link 'b': has no inertial element, and its joint moves");
+  EXPECT_NE(urdfRefusal(urdf(link("a") + link("b") + joint("j1", "a", "gone"))).find("gone"),
+            std::string::npos);
+  EXPECT_NE(urdfRefusal(urdf(link("a") + link("b") + joint("j1", "a", "b") + joint("j2", "b", "a")))
+                .find("r.urdf:"), std::string::npos);  // cyclic
+  EXPECT_NE(urdfRefusal(urdf(link("a") + link("b") + joint("j1", "a", "b", "planar")))
+                .find("not supported"), std::string::npos);
+  EXPECT_NE(urdfRefusal(urdf(link("a") + link("b", "-0.1") + joint("j1", "a", "b")))
+                .find("principal moment"), std::string::npos);
+  EXPECT_NE(urdfRefusal(urdf(link("a") + link("b", "nan") + joint("j1", "a", "b"))), "");
+  EXPECT_NE(urdfRefusal("not xml").find("r.urdf:1"), std::string::npos);
+  EXPECT_NE(urdfRefusal(""), "");
+  for (const std::string& text : {std::string("not xml"), urdf(""), urdf(link("a") + link("b"))})
+    EXPECT_EQ(urdfRefusal(text).find('\n'), std::string::npos);
+}
+
+}  // namespace
+}  // namespace ves

@@ -1,0 +1,589 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <limits>
+#include <random>
+#include <unsupported/Eigen/MatrixFunctions>
+
+#include "support/poses.hpp"
+#include "support/robots.hpp"
+#include "ves/config/experiment.hpp"
+#include "ves/config/modes.hpp"
+#include "ves/robot/newton_euler.hpp"
+
+namespace ves {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kT = 0.01;  // [s]
+
+Experiment experiment(const std::string& name) {
+  return loadExperiment(test::configDir() + "/scenarios/" + name + ".yaml");
+}
+
+Mat6 randomDefinite(unsigned seed, double scale) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> n;
+  Mat6 A;
+  for (int i = 0; i < 36; ++i) A(i) = n(random);
+  return scale * (A * A.transpose() + Mat6::Identity());
+}
+
+// --- Force measurement, calibration, gravity compensation ---------------------------------------
+
+TEST(ForceMeasurement, UndoesSensorAndFrames) {  // (2.6) forward, (C.1) back
+  const Experiment e = experiment("puma_tilt");
+  const Mat6 S_proc = e.plant.sensor.S_proc();
+  for (const Pose& x : test::poses(50)) {
+    const Mat3 R_IP = rotation(x.rpy);
+    const Wrench F_Po_I{Vec3(30.0, -20.0, 100.0), Vec3(9.0, 12.0, -3.0)};
+    // Inertial to platform, to the sensor's origin, to the sensor's axes, written out.
+    const Vec3 f_P = R_IP.transpose() * F_Po_I.f, n_P = R_IP.transpose() * F_Po_I.n;
+    const Vec3 p = e.controller.sensor.X_PS.p;
+    const Vec3 n_So = n_P - p.cross(f_P);
+    Vec6 W_S;
+    W_S << f_P.x(), -f_P.y(), -f_P.z(), n_So.x(), -n_So.y(), -n_So.z();  // 180 degrees about x
+    const Vec6 bias = Vec6::Constant(37.0);
+    const Vec6 counts = S_proc * W_S + bias;
+    AdcCounts adc{};
+    for (int i = 0; i < 6; ++i) adc[static_cast<std::size_t>(i)] = static_cast<int>(std::lround(counts(i)));
+    const Wrench out = forceMeasurement(e.controller.sensor, bias, adc, R_IP);
+    // Half a count in each channel is 0.023 N (x, y), 0.09 N (z), 0.009 N m at gain 1000.
+    ASSERT_LT((out.f - F_Po_I.f).norm(), 0.11);
+    ASSERT_LT((out.n - F_Po_I.n).norm(), 0.03);
+  }
+}
+
+TEST(Calibration, GivesMeanAndStandardDeviation) {
+  Calibration calibration;
+  std::mt19937 random(2);
+  std::uniform_int_distribution<int> u(-1000, 1000);
+  std::vector<double> x;
+  const Vec6 load = Vec6::Constant(10.0);
+  while (!calibration.complete()) {
+    AdcCounts adc{};
+    adc[2] = 20000 + u(random);
+    x.push_back(adc[2] - 10.0);
+    calibration.add(adc, load);
+  }
+  ASSERT_EQ(x.size(), 100u);
+  double mean = 0.0, variance = 0.0;
+  for (double v : x) mean += v / 100;
+  for (double v : x) variance += (v - mean) * (v - mean) / 99;
+  EXPECT_NEAR(calibration.mean()(2), mean, 1e-9);
+  EXPECT_NEAR(calibration.deviation()(2), std::sqrt(variance), 1e-9);
+  EXPECT_NEAR(calibration.mean()(0), -10.0, 1e-12);
+  EXPECT_NEAR(calibration.deviation()(0), 0.0, 1e-12);
+}
+
+TEST(GravityCompensation, EqualsNewtonEulerAtRest) {
+  for (const char* name : {"puma_tilt", "doss_on_table_4_1"}) {
+    const Experiment e = experiment(name);
+    const Payload& load = e.controller.payload;
+    const Vec3 g_I = e.controller.gravity;
+    std::mt19937 random(4);
+    std::uniform_real_distribution<double> u(-3.0, 3.0);
+    for (const Pose& x : test::poses(100)) {
+      JointState s;
+      for (int i = 0; i < load.robot.joints; ++i) s.q(i) = u(random);
+      BodyMotion P;
+      P.X = {rotation(x.rpy), x.p};
+      const auto part = [&](const Transform& X_PB, const Wrench& on_body) {
+        return rotate(P.X.R, transfer(X_PB, Wrench{} - on_body));
+      };
+      const Wrench oracle =
+          part(load.X_PL0(),
+               newtonEuler(load.robot, s, feltMotion(P, load.X_PL0(), g_I)).F_L0o_L0) +
+          part(load.X_PR, inertialWrench(load.adapter_R, feltMotion(P, load.X_PR, g_I))) +
+          part(load.X_PS, inertialWrench(load.top_plate_S, feltMotion(P, load.X_PS, g_I)));
+      const Wrench out = gravityCompensation(load, s.q, P.X.R, g_I);
+      ASSERT_LT((out - oracle).stacked().norm(), 1e-9);
+    }
+  }
+}
+
+TEST(GravityCompensation, IsTheHandSumAtHome) {  // m g, and r x m g of each plate and link
+  const Experiment e = experiment("puma_tilt");
+  JointVector zero = JointVector::Zero();
+  const Wrench F_Po = gravityCompensation(e.controller.payload, zero, Mat3::Identity(), {0, 0, -9.81});
+  EXPECT_NEAR(F_Po.f.z(), -9.81 * (52.45 + 16.0 + 5.0), 1e-9);
+  EXPECT_NEAR(F_Po.f.head<2>().norm(), 0.0, 1e-9);
+  // AKB pose of zeros: moment of links 1 to 6 about frame 0 is (60.31978, -36.98581), of the support on
+  // the robot; link 0 adds 20 kg at y = -0.015. The plates are centred.
+  EXPECT_NEAR(F_Po.n.x(), -60.31978 + 20.0 * 9.81 * 0.015, 1e-4);
+  EXPECT_NEAR(F_Po.n.y(), 36.98581, 1e-4);
+}
+
+TEST(GravityCompensation, VanishesInSpace) {
+  const Experiment e = experiment("puma_tilt");
+  EXPECT_EQ(gravityCompensation(e.controller.payload, e.plant.initial_joints, rotation({0.3, 0.2, 0.1}),
+                                Vec3::Zero()).stacked().norm(), 0.0);
+}
+
+// --- Admittance model ---------------------------------------------------------------------------
+
+/// exp([A B; 0 0] T) of M x'' + C x' + K x = W, all six coordinates at once.
+class HoldOracle {
+ public:
+  HoldOracle(const Mat6& M, const Mat6& C, const Mat6& K, double T) {
+    Eigen::Matrix<double, 18, 18> A = Eigen::Matrix<double, 18, 18>::Zero();
+    const Mat6 inverse = M.inverse();
+    A.block<6, 6>(0, 6).setIdentity();
+    A.block<6, 6>(6, 0) = -inverse * K;
+    A.block<6, 6>(6, 6) = -inverse * C;
+    A.block<6, 6>(6, 12) = inverse;
+    E_ = (A * T).exp();
+  }
+  void step(const Vec6& W) {
+    Eigen::Matrix<double, 18, 1> s;
+    s << x, x_dot, W;
+    s = (E_ * s).eval();
+    x = s.head<6>();
+    x_dot = s.segment<6>(6);
+  }
+  Vec6 x = Vec6::Zero(), x_dot = Vec6::Zero();
+
+ private:
+  Eigen::Matrix<double, 18, 18> E_;
+};
+
+struct Base {
+  const char* name;
+  Mat6 M, C, K;
+};
+std::ostream& operator<<(std::ostream& out, const Base& base) { return out << base.name; }
+
+std::vector<Base> bases() {
+  Vec6 M, C, K, soft;
+  M << 500, 500, 500, 250, 250, 250;
+  C << 500, 500, 500, 250, 250, 250;
+  K << 1500, 2500, 4000, 1500, 1000, 2000;
+  soft << 0, 2500, 0, 1500, 0, 0;
+  const Mat6 Md = M.asDiagonal(), Cd = C.asDiagonal(), Kd = K.asDiagonal(), zero = Mat6::Zero();
+  const Mat6 Mr = randomDefinite(1, 50), Kr = randomDefinite(2, 400), Cr = randomDefinite(3, 60);
+  return {{"table_4_1", Md, Cd, Kd},
+          {"full_proportional", Mr, Mat6(0.3 * Mr + 0.01 * Kr), Kr},
+          {"not_proportional", Mr, Cr, Kr},
+          {"overdamped_not_proportional", Mr, Mat6(20 * Cr), Kr},
+          {"undamped", Mr, zero, Kr},
+          {"partly_free", Md, Cd, Mat6(soft.asDiagonal())},
+          {"free_floating", Mr, zero, zero},
+          {"free_with_damper", Mr, Cr, zero},
+          {"critical", Md, Mat6((2 * (M.array() * K.array()).sqrt()).matrix().asDiagonal()), Kd}};
+}
+
+class Admittance : public testing::TestWithParam<Base> {};
+
+TEST_P(Admittance, StepsAsTheMatrixExponential) {
+  const auto& [name, M, C, K] = GetParam();
+  AdmittanceModel model(modesOf(M, C, K), kT);
+  HoldOracle oracle(M, C, K, kT);
+  oracle.x << 0.1, -0.08, 0.06, 0.1, -0.1, 0.2;
+  model.reset(oracle.x);
+  std::mt19937 random(5);
+  std::normal_distribution<double> n(0.0, 20.0);
+  for (int i = 0; i < 2000; ++i) {
+    Vec6 W;
+    for (int j = 0; j < 6; ++j) W(j) = n(random);
+    model.step(Wrench::from(W));
+    oracle.step(W);
+    const double scale = 1.0 + oracle.x.norm();
+    ASSERT_LT((model.motion().x - oracle.x).norm(), 1e-10 * scale) << "step " << i;
+    ASSERT_LT((model.motion().x_dot - oracle.x_dot).norm(), 1e-9 * scale) << "step " << i;
+    const Vec6 acceleration = M.inverse() * (W - C * oracle.x_dot - K * oracle.x);  // (C.7)
+    ASSERT_LT((model.motion().x_ddot - acceleration).norm(), 1e-7 * scale) << "step " << i;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Bases, Admittance, testing::ValuesIn(bases()),
+                         [](const auto& test) { return std::string(test.param.name); });
+
+TEST(AdmittanceModel, KeepsWhatFewModesCannotExpress) {
+  ModalModel model;
+  model.Phi = Vec6::Unit(2) / std::sqrt(500.0);
+  model.stiffness = Eigen::VectorXd::Constant(1, 8.0);
+  model.damping = Eigen::MatrixXd::Zero(1, 1);
+  AdmittanceModel admittance(model, kT);
+  Vec6 x;
+  x << 0.01, 0.02, 0.03, 0.04, 0.05, 0.06;
+  admittance.reset(x);
+  for (int i = 1; i <= 100; ++i) {
+    admittance.step({});
+    Vec6 expected = x;
+    expected(2) = 0.03 * std::cos(std::sqrt(8.0) * kT * i);
+    ASSERT_LT((admittance.motion().x - expected).norm(), 1e-12);
+  }
+}
+
+TEST(Modes, AreMassNormalised) {
+  const Mat6 M = randomDefinite(1, 50), K = randomDefinite(2, 400);
+  const ModalModel modes = modesOf(M, Mat6::Zero(), K);
+  EXPECT_LT((modes.Phi.transpose() * M * modes.Phi - Mat6::Identity()).norm(), 1e-12);
+  const Mat6 stiffness = modes.stiffness.asDiagonal();
+  EXPECT_LT((modes.Phi.transpose() * K * modes.Phi - stiffness).norm(), 1e-10 * stiffness.norm());
+}
+
+TEST(Modes, KeepDampingThatCouples) {
+  const ModalModel modes =
+      modesOf(randomDefinite(1, 50), randomDefinite(3, 60), randomDefinite(2, 400));
+  EXPECT_FALSE(modes.damping.isDiagonal(1e-6));
+}
+
+// --- Trajectory generation, leg communication ---------------------------------------------------
+
+TEST(TrajectoryGeneration, RampsAndSinesAreTheReportsEquations) {
+  Trajectory trajectory{};
+  trajectory[0] = {AxisMotion::kRamp, 0.2, 0.0, 0.0};
+  trajectory[2] = {AxisMotion::kSine, 0.0, 0.1, 0.5};
+  Vec6 initial;
+  initial << 0.05, 0.01, -0.02, 0.0, 0.0, 0.3;
+  const std::int64_t N = 250;
+  Vec6 x = initial;
+  for (std::int64_t n = 1; n <= N; ++n) {
+    x(0) += (0.2 - 0.05) / 250;                                          // (C.8), (C.9) accumulated
+    x(2) = -0.02 + 0.1 * std::sin(2 * M_PI * 0.5 * 0.01 * static_cast<double>(n));  // (C.10)
+    const PathPoint<6> p = trajectoryGeneration(trajectory, initial, n, N, kT);
+    ASSERT_LT((p.x - x).norm(), 1e-13);
+  }
+  EXPECT_EQ(trajectoryGeneration(trajectory, initial, N, N, kT).x(0), 0.2);
+  EXPECT_EQ(trajectoryGeneration(trajectory, initial, N + 7, N, kT).x(0), 0.2);
+}
+
+TEST(TrajectoryGeneration, RatesAreDerivatives) {
+  Trajectory trajectory{};
+  trajectory[0] = {AxisMotion::kRamp, 0.2, 0.0, 0.0};
+  trajectory[4] = {AxisMotion::kSine, 0.0, 0.3, 1.5};
+  const auto at = [&](std::int64_t n) {
+    return trajectoryGeneration(trajectory, Vec6::Zero(), n, 100000, 1e-5);
+  };
+  for (std::int64_t n = 10; n < 90000; n += 1000) {
+    EXPECT_LT((at(n).x_dot - (at(n + 1).x - at(n - 1).x) / 2e-5).norm(), 1e-6);
+    EXPECT_LT((at(n).x_ddot - (at(n + 1).x_dot - at(n - 1).x_dot) / 2e-5).norm(), 1e-5);
+  }
+}
+
+TEST(LegCommunication, RoundTripsWithinHalfACount) {
+  LegCodec codec;
+  codec.offset.setConstant(0.9);
+  codec.scale.setConstant(0.0254 / 363.6);
+  std::mt19937 random(6);
+  std::uniform_real_distribution<double> u(1.2, 1.85);
+  for (int k = 0; k < 1000; ++k) {
+    Vec6 L;
+    for (int i = 0; i < 6; ++i) L(i) = u(random);
+    ASSERT_LE((legLengths(codec, legCounts(codec, L)) - L).cwiseAbs().maxCoeff(),
+              0.5 * 0.0254 / 363.6 * (1 + 1e-9));
+  }
+}
+
+// --- Safety checks: just inside holds, just past trips, NaN trips --------------------------------
+
+class SafetyChecks : public testing::Test {
+ protected:
+  const Experiment e_ = experiment("z_sine");
+  const SafetyLimits& l_ = e_.controller.safety;
+  const Geometry& g_ = e_.controller.geometry;
+  const Vec6 L_ = legLengths(g_, g_.fromHome({}));
+};
+
+TEST_F(SafetyChecks, Velocity) {
+  for (int i = 0; i < 6; ++i) {
+    for (double sign : {-1.0, 1.0}) {
+      EXPECT_TRUE(velocityCheck(l_, L_ + sign * 0.999 * l_.leg_velocity * kT * Vec6::Unit(i), L_, kT));
+      EXPECT_FALSE(velocityCheck(l_, L_ + sign * 1.001 * l_.leg_velocity * kT * Vec6::Unit(i), L_, kT));
+    }
+    EXPECT_FALSE(velocityCheck(l_, L_ + kNan * Vec6::Unit(i), L_, kT));
+  }
+}
+
+TEST_F(SafetyChecks, PositionError) {
+  for (int i = 0; i < 6; ++i) {
+    EXPECT_TRUE(positionErrorCheck(l_, L_, L_ + 0.999 * l_.position_error * Vec6::Unit(i)));
+    EXPECT_FALSE(positionErrorCheck(l_, L_, L_ - 1.001 * l_.position_error * Vec6::Unit(i)));
+    EXPECT_FALSE(positionErrorCheck(l_, L_, L_ + kNan * Vec6::Unit(i)));
+  }
+}
+
+TEST_F(SafetyChecks, MotionLimits) {
+  for (int i = 0; i < 6; ++i) {
+    const double limit = i < 3 ? 0.305 : 30 * kDegree;
+    for (double sign : {-1.0, 1.0}) {
+      EXPECT_TRUE(motionLimitsCheck(l_, Pose::from(sign * 0.999 * limit * Vec6::Unit(i))));
+      EXPECT_FALSE(motionLimitsCheck(l_, Pose::from(sign * 1.001 * limit * Vec6::Unit(i))));
+    }
+    EXPECT_FALSE(motionLimitsCheck(l_, Pose::from(kNan * Vec6::Unit(i))));
+  }
+}
+
+TEST_F(SafetyChecks, ActuatorLimits) {
+  for (int i = 0; i < 6; ++i) {
+    Vec6 L = L_;
+    L(i) = l_.leg_max - 1e-6;
+    EXPECT_TRUE(actuatorLimitsCheck(l_, L));
+    for (double bad : {l_.leg_max + 1e-6, l_.leg_min - 1e-6, kNan}) {
+      L(i) = bad;
+      EXPECT_FALSE(actuatorLimitsCheck(l_, L)) << bad;
+    }
+  }
+}
+
+TEST_F(SafetyChecks, FlowLimits) {
+  const double extend = l_.flow / l_.bore_area * kT, retract = l_.flow / l_.rod_side_area * kT;
+  for (int i = 0; i < 6; ++i) {
+    EXPECT_TRUE(flowLimitsCheck(l_, L_ + 0.999 * extend * Vec6::Unit(i), L_, kT));
+    EXPECT_FALSE(flowLimitsCheck(l_, L_ + 1.001 * extend * Vec6::Unit(i), L_, kT));
+    EXPECT_TRUE(flowLimitsCheck(l_, L_ - 0.999 * retract * Vec6::Unit(i), L_, kT));
+    EXPECT_FALSE(flowLimitsCheck(l_, L_ - 1.001 * retract * Vec6::Unit(i), L_, kT));
+    EXPECT_FALSE(flowLimitsCheck(l_, L_ + kNan * Vec6::Unit(i), L_, kT));
+  }
+}
+
+TEST_F(SafetyChecks, JointLimits) {
+  const JointAxes axes(g_);
+  SafetyLimits limits = l_;
+  // A pure tilt turns the platform's joints by the tilt, and the legs a little.
+  const Transform tilted = g_.fromHome({Vec3::Zero(), {20 * kDegree, 0.0, 0.0}});
+  limits.joint_cone = 30 * kDegree;
+  EXPECT_TRUE(axes.check(limits, g_, tilted));
+  limits.joint_cone = 15 * kDegree;
+  EXPECT_FALSE(axes.check(limits, g_, tilted));
+  // A pure shift turns both ends alike: the angle of the most turned leg, by its cosine.
+  const Transform shifted = g_.fromHome({{0.2, 0.0, 0.0}, Vec3::Zero()});
+  double most = 0.0;
+  for (std::size_t i = 0; i < kLegs; ++i) {
+    const Vec3 a = g_.fromHome({}) * g_.p_PPi_P[i] - g_.p_IBi_I[i], b = a + Vec3(0.2, 0.0, 0.0);
+    most = std::max(most, std::acos(a.dot(b) / a.norm() / b.norm()));
+  }
+  limits.joint_cone = most * 1.001;
+  EXPECT_TRUE(axes.check(limits, g_, shifted));
+  limits.joint_cone = most * 0.999;
+  EXPECT_FALSE(axes.check(limits, g_, shifted));
+  EXPECT_FALSE(axes.check(l_, g_, {Mat3::Identity(), {kNan, 0.0, 1.35}}));
+}
+
+TEST_F(SafetyChecks, SegmentDistanceIsTheSmallestOfManyPoints) {
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> u(-1.0, 1.0);
+  const auto point = [&] { return Vec3(u(random), u(random), u(random)); };
+  for (int k = 0; k < 300; ++k) {
+    const Vec3 a = point(), b = point(), c = point(), d = k % 5 ? point() : Vec3(c + 0.7 * (b - a));
+    double least = 1e9;
+    constexpr int kGrid = 200;
+    for (int i = 0; i <= kGrid; ++i)
+      for (int j = 0; j <= kGrid; ++j)
+        least = std::min(least, (a + (b - a) * i / kGrid - c - (d - c) * j / kGrid).norm());
+    const double distance = segmentDistance(a, b, c, d);
+    ASSERT_LE(distance, least + 1e-12);
+    ASSERT_GE(distance, least - 0.02);  // of the grid
+  }
+}
+
+TEST_F(SafetyChecks, Collide) {
+  const Transform home = g_.fromHome({});
+  SafetyLimits limits = l_;
+  double least = 1e9;
+  for (std::size_t i = 0; i < kLegs; ++i)
+    for (std::size_t j = i + 1; j < kLegs; ++j)
+      least = std::min(least, segmentDistance(g_.p_IBi_I[i], home * g_.p_PPi_P[i], g_.p_IBi_I[j],
+                                              home * g_.p_PPi_P[j]));
+  limits.leg_clearance = least * 0.999;
+  EXPECT_TRUE(collideCheck(limits, g_, home));
+  limits.leg_clearance = least * 1.001;
+  EXPECT_FALSE(collideCheck(limits, g_, home));
+  EXPECT_FALSE(collideCheck(l_, g_, {Mat3::Identity(), {kNan, 0.0, 1.35}}));
+}
+
+TEST_F(SafetyChecks, TheWorkspaceItselfIsFreeOfTrips) {  // every coordinate alone, to its ends
+  const JointAxes axes(g_);
+  for (int i = 0; i < 6; ++i)
+    for (double share = -0.99; share < 1.0; share += 0.09) {
+      const Pose x = Pose::from(share * (i < 3 ? 0.305 : 30 * kDegree) * Vec6::Unit(i));
+      const Transform X = g_.fromHome(x);
+      EXPECT_TRUE(actuatorLimitsCheck(l_, legLengths(g_, X))) << x.stacked().transpose();
+      EXPECT_TRUE(collideCheck(l_, g_, X)) << x.stacked().transpose();
+      EXPECT_TRUE(axes.check(l_, g_, X)) << x.stacked().transpose();
+    }
+}
+
+TEST(TrippedSet, FirstIsTheHighestPriority) {
+  Tripped t;
+  EXPECT_EQ(t.first(), Check::kCount);
+  t.require(Check::kFlow, false);
+  t.require(Check::kCollide, false);
+  t.require(Check::kPanicButton, true);
+  EXPECT_EQ(t.first(), Check::kCollide);
+  EXPECT_TRUE(t.has(Check::kFlow));
+  EXPECT_FALSE(t.has(Check::kPanicButton));
+}
+
+// --- testPlatform --------------------------------------------------------------------------------
+
+/// A controller on a machine that goes exactly where it is told, at once.
+class Bench {
+ public:
+  explicit Bench(const std::string& scenario)
+      : e_(experiment(scenario)), platform_(e_.controller) {
+    const Geometry& g = e_.controller.geometry;
+    in_.sample.legs =
+        legCounts(e_.controller.legs, legLengths(g, g.fromHome({{0.01, -0.02, -0.05}, {0.02, 0.0, 0.01}})));
+    in_.sample.q = e_.plant.initial_joints;
+    in_.sample.switches = kAllSwitchesClosed;
+    in_.request = Request::kStart;
+  }
+  const TickState& tick() {
+    ++in_.sample.sequence;
+    const TickState& state = platform_.tick(in_);
+    ++in_.tick;
+    in_.request = Request::kNone;
+    if (state.command.engaged) in_.sample.legs = state.command.counts;
+    return state;
+  }
+  const TickState& tickUntil(Phase phase) {
+    const TickState* state = &tick();
+    for (int i = 0; i < 5000 && state->phase != phase; ++i) state = &tick();
+    return *state;
+  }
+  TickInput& in() { return in_; }
+  const Experiment& experimentUsed() const { return e_; }
+
+ private:
+  Experiment e_;
+  TestPlatform platform_;
+  TickInput in_;
+};
+
+TEST(TestPlatform, FirstCommandIsTheMeasuredPose) {
+  Bench bench("z_sine");
+  const LegCounts found = bench.in().sample.legs;
+  for (int i = 0; i < 100; ++i) {
+    const TickState& state = bench.tick();
+    if (!state.command.engaged) continue;
+    EXPECT_EQ(state.phase, Phase::kArmed);
+    for (std::size_t k = 0; k < kLegs; ++k) EXPECT_LE(std::abs(state.command.counts[k] - found[k]), 1);
+    return;
+  }
+  FAIL() << "never armed";
+}
+
+TEST(TestPlatform, ArmsOnlyAfterAFreshStream) {
+  Bench bench("z_sine");
+  for (int i = 0; i < 50; ++i) {
+    if (i % 5 == 0) --bench.in().sample.sequence;  // every fifth sample is the one before
+    EXPECT_EQ(bench.tick().phase, Phase::kDisarmed);
+  }
+  for (int i = 0; i < 11; ++i) bench.tick();
+  EXPECT_EQ(bench.tick().phase, Phase::kRunning);
+}
+
+TEST(TestPlatform, RefusesToArmBesideAnotherController) {
+  Bench bench("z_sine");
+  for (int i = 0; i < 50; ++i) {
+    bench.in().rival = i % 2 == 0;
+    bench.tick();
+  }
+  bench.in().rival = true;
+  const TickState& state = bench.tick();
+  EXPECT_EQ(state.phase, Phase::kDisarmed);
+  EXPECT_TRUE(state.tripped.has(Check::kRival));
+}
+
+TEST(TestPlatform, ComesHomeGentlyAndParks) {
+  Bench bench("ramp");
+  const TickState& state = bench.tickUntil(Phase::kParked);
+  EXPECT_EQ(state.phase, Phase::kParked);
+  EXPECT_EQ(state.motion.x.norm(), 0.0);
+  EXPECT_EQ(state.motion.x_dot.norm(), 0.0);
+}
+
+TEST(TestPlatform, StopRequestComesHomeWithoutAJump) {
+  Bench bench("z_sine");
+  while (bench.tick().segment < 1) {
+  }
+  for (int i = 0; i < 180; ++i) bench.tick();  // in full swing
+  const double rate = bench.tick().motion.x_dot(2);
+  EXPECT_GT(std::abs(rate), 0.2);
+  bench.in().request = Request::kStop;
+  const Vec6 before = bench.tick().motion.x_dot;
+  EXPECT_NEAR(before(2), rate, 0.05);
+  EXPECT_EQ(bench.tickUntil(Phase::kParked).phase, Phase::kParked);
+}
+
+struct Fault {
+  const char* name;
+  Check check;
+  void (*inject)(TickInput&);
+};
+std::ostream& operator<<(std::ostream& out, const Fault& fault) { return out << fault.name; }
+
+class Trips : public testing::TestWithParam<Fault> {};
+
+TEST_P(Trips, LatchesAndHoldsTheLastCheckedLengths) {
+  Bench bench("puma_tilt");
+  bench.tickUntil(Phase::kRunning);
+  for (int i = 0; i < 400; ++i) bench.tick();
+  const LegCounts last = bench.tick().command.counts;
+  GetParam().inject(bench.in());
+  const TickState& state = bench.tick();
+  EXPECT_EQ(state.phase, Phase::kStopped);
+  EXPECT_EQ(state.cause, GetParam().check);
+  EXPECT_EQ(state.cause_tick, state.tick);
+  EXPECT_EQ(state.command.counts, last);
+  EXPECT_TRUE(state.command.engaged);
+  // The cause goes away; the stop stays.
+  bench.in().sample.switches = kAllSwitchesClosed;
+  bench.in().sample.q = bench.experimentUsed().plant.initial_joints;
+  bench.in().rival = false;
+  for (int i = 0; i < 100; ++i) {
+    bench.in().sample.legs = last;
+    EXPECT_EQ(bench.tick().command.counts, last);
+  }
+  EXPECT_EQ(bench.tick().phase, Phase::kStopped);
+  EXPECT_EQ(bench.tick().cause, GetParam().check);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Faults, Trips,
+    testing::Values(
+        Fault{"panic_button", Check::kPanicButton,
+              [](TickInput& in) { in.sample.switches &= ~kPanicButtonClosed; }},
+        Fault{"floor_mat", Check::kFloorMat,
+              [](TickInput& in) { in.sample.switches &= ~kFloorMatClosed; }},
+        Fault{"joint_angle_nan", Check::kFinite, [](TickInput& in) { in.sample.q(2) = kNan; }},
+        Fault{"joint_angle_infinite", Check::kFinite,
+              [](TickInput& in) { in.sample.q(0) = std::numeric_limits<double>::infinity(); }},
+        Fault{"leg_stuck_far_off", Check::kPositionError,
+              [](TickInput& in) { in.sample.legs[3] -= 1700; }},
+        Fault{"legs_without_a_pose", Check::kForwardKinematics,
+              [](TickInput& in) { in.sample.legs = {0, 16383, 0, 16383, 0, 16383}; }},
+        Fault{"second_controller", Check::kRival, [](TickInput& in) { in.rival = true; }}),
+    [](const auto& test) { return std::string(test.param.name); });
+
+TEST(TestPlatform, SilenceTripsAfterTheAllowedAge) {
+  Bench bench("puma_tilt");
+  bench.tickUntil(Phase::kRunning);
+  const int allowed = bench.experimentUsed().controller.safety.stale_ticks;
+  for (int i = 1; i <= allowed; ++i) {
+    --bench.in().sample.sequence;
+    EXPECT_EQ(bench.tick().phase, Phase::kRunning) << i;
+  }
+  --bench.in().sample.sequence;
+  const TickState& state = bench.tick();
+  EXPECT_EQ(state.phase, Phase::kStopped);
+  EXPECT_EQ(state.cause, Check::kStale);
+}
+
+TEST(TestPlatform, NoJointAngleEverReachesACommandAsNan) {
+  Bench bench("puma_on_table_4_1");
+  bench.tickUntil(Phase::kRunning);
+  for (int i = 0; i < 600; ++i) bench.tick();  // into admittance control
+  bench.in().sample.q.setConstant(kNan);
+  for (int i = 0; i < 50; ++i) {
+    const TickState& state = bench.tick();
+    ASSERT_TRUE(state.motion.x.allFinite());
+    ASSERT_TRUE(state.legs.L.allFinite());
+  }
+}
+
+}  // namespace
+}  // namespace ves

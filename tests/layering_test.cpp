@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Holds the module diagram of the README: who may include whom, and what the control path is free of.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <regex>
+#include <set>
+
+namespace {
+
+namespace fs = std::filesystem;
+using Names = std::set<std::string>;
+
+const fs::path kRoot = VES_TEST_SOURCE_DIR;
+
+/// What a module may include beside itself.
+const std::map<std::string, Names> kMayInclude = {
+    {"math", {}},
+    {"kinematics", {"math"}},
+    {"robot", {"math"}},
+    {"control", {"math", "kinematics", "robot"}},
+    {"plant", {"math", "kinematics", "robot", "control"}},
+    {"config", {"math", "kinematics", "robot", "control", "plant"}},
+    {"realtime", {"config"}},
+    {"transport", {"math", "kinematics", "robot", "control", "plant", "config"}},
+    {"run", {"math", "kinematics", "robot", "control", "plant", "config", "transport", "realtime"}},
+    {"report",
+     {"math", "kinematics", "robot", "control", "plant", "config", "transport", "realtime", "run"}},
+};
+
+const Names kPure = {"math", "kinematics", "robot", "control"};
+
+struct Include {
+  fs::path file;
+  std::string module, name;
+};
+
+std::vector<Include> includes() {
+  std::vector<Include> out;
+  const std::regex line(R"(^\s*#\s*include\s*[<"]([^>"]+)[>"])");
+  for (const fs::path& top : {kRoot / "include/ves", kRoot / "src"})
+    for (const auto& entry : fs::recursive_directory_iterator(top)) {
+      const std::string extension = entry.path().extension();
+      if (extension != ".hpp" && extension != ".cpp") continue;
+      std::ifstream in(entry.path());
+      std::string text;
+      std::smatch match;
+      while (std::getline(in, text))
+        if (std::regex_search(text, match, line))
+          out.push_back({entry.path(), entry.path().parent_path().filename(), match[1]});
+    }
+  return out;
+}
+
+TEST(Layering, NothingPointsUp) {
+  const std::regex ours(R"(^ves/([a-z]+)/)");
+  int seen = 0;
+  for (const Include& i : includes()) {
+    ASSERT_TRUE(kMayInclude.count(i.module)) << i.file << " is in no known module";
+    std::smatch match;
+    if (!std::regex_search(i.name, match, ours)) continue;
+    ++seen;
+    const std::string target = match[1];
+    EXPECT_TRUE(target == i.module || kMayInclude.at(i.module).count(target))
+        << i.file << " includes " << i.name;
+  }
+  EXPECT_GT(seen, 50);
+}
+
+TEST(Layering, ControlPathKnowsEigenAndTheLanguageOnly) {
+  const Names allowed = {"algorithm", "array", "cassert", "cmath", "cstdint", "string_view",
+                         "Eigen/Core", "Eigen/Geometry", "Eigen/LU", "Eigen/QR",
+                         "unsupported/Eigen/MatrixFunctions"};
+  for (const Include& i : includes())
+    if (kPure.count(i.module) && i.name.rfind("ves/", 0) != 0) {
+      EXPECT_TRUE(allowed.count(i.name)) << i.file << " includes " << i.name;
+    }
+}
+
+TEST(Layering, LinkGraphIsTheSameDiagram) {
+  std::ifstream in(kRoot / "src/CMakeLists.txt");
+  const std::string text((std::istreambuf_iterator<char>(in)), {});
+  const std::regex module(R"(ves_module\((\w+)([^)]*)\))"), link(R"(ves::(\w+))");
+  int seen = 0;
+  for (std::sregex_iterator m(text.begin(), text.end(), module), end; m != end; ++m) {
+    if ((*m)[1] == "name") continue;
+    const std::string name = (*m)[1], body = (*m)[2];
+    ASSERT_TRUE(kMayInclude.count(name)) << name;
+    ++seen;
+    for (std::sregex_iterator l(body.begin(), body.end(), link); l != end; ++l)
+      EXPECT_TRUE(kMayInclude.at(name).count((*l)[1])) << name << " links " << (*l)[1];
+  }
+  EXPECT_EQ(seen, static_cast<int>(kMayInclude.size()));
+}
+
+TEST(Layering, ControlPathNeitherThrowsNorAllocatesNorPrints) {
+  const std::regex banned(R"(\b(throw|new|malloc|std::vector|std::string|printf|std::cout|std::function|std::mutex|std::chrono)\b)");
+  for (const fs::path& top : {kRoot / "include/ves", kRoot / "src"})
+    for (const std::string& module : kPure)
+      for (const auto& entry : fs::directory_iterator(top / module)) {
+        std::ifstream in(entry.path());
+        std::string text;
+        for (int n = 1; std::getline(in, text); ++n) {
+          const std::string code = text.substr(0, text.find("//"));
+          std::smatch match;
+          if (std::regex_search(code, match, banned) && code.find("std::string_view") == std::string::npos)
+            ADD_FAILURE() << entry.path() << ":" << n << ": " << match[1];
+        }
+      }
+}
+
+}  // namespace

@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <kdl/frames.hpp>
+#include <ostream>
+#include <unsupported/Eigen/MatrixFunctions>
+
+#include "support/poses.hpp"
+#include "ves/math/butterworth.hpp"
+#include "ves/math/frames.hpp"
+#include "ves/math/quintic.hpp"
+#include "ves/math/second_order.hpp"
+
+namespace ves {
+namespace {
+
+TEST(Rotation, IsTheFixedAngleRotationOfKdl) {
+  for (const Pose& x : test::poses()) {
+    const KDL::Rotation oracle = KDL::Rotation::RPY(x.rpy(0), x.rpy(1), x.rpy(2));
+    const Mat3 R = rotation(x.rpy);
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) ASSERT_NEAR(R(i, j), oracle(i, j), 1e-15);
+  }
+}
+
+TEST(Rotation, FixedAnglesComeBack) {
+  for (const Pose& x : test::poses())
+    ASSERT_LT((fixedAngles(rotation(x.rpy)) - x.rpy).norm(), 1e-14);
+}
+
+TEST(AngleRates, MatchTheDerivativeOfTheRotation) {
+  const test::Swing swing(3);
+  const double h = 1e-5;
+  for (double t = 0.0; t < 3.0; t += 0.1) {
+    const Mat3 R = rotation(swing.x(t).tail<3>());
+    const Mat3 R_dot = (rotation(swing.x(t + h).tail<3>()) - rotation(swing.x(t - h).tail<3>())) /
+                       (2.0 * h);
+    const Mat3 W = R_dot * R.transpose();  // skew(w_IP_I)
+    const Vec3 w = angleRateMap(swing.x(t).tail<3>()) * swing.xDot(t).tail<3>();
+    ASSERT_LT((Vec3(W(2, 1), W(0, 2), W(1, 0)) - w).norm(), 1e-8);
+  }
+}
+
+TEST(AngleRates, MapDerivativeMatchesFiniteDifferences) {
+  const test::Swing swing(4);
+  const double h = 1e-5;
+  for (double t = 0.0; t < 3.0; t += 0.1) {
+    const Mat3 oracle = (angleRateMap(swing.x(t + h).tail<3>()) -
+                         angleRateMap(swing.x(t - h).tail<3>())) / (2.0 * h);
+    const Mat3 E_dot = angleRateMapDerivative(swing.x(t).tail<3>(), swing.xDot(t).tail<3>());
+    ASSERT_LT((oracle - E_dot).norm(), 1e-8);
+  }
+}
+
+TEST(Wrench, ShiftAndTransferKeepPower) {
+  for (const Pose& x : test::poses(200)) {
+    const Transform X_AB{rotation(x.rpy), x.p};
+    const Wrench F_Bo_B{Vec3(1.0, -2.0, 3.0), Vec3(0.3, 0.2, -0.1)};
+    const Vec3 v_A(0.4, -0.3, 0.2), w_A(-0.1, 0.5, 0.7);  // twist of Ao, one rigid body
+    const Vec3 v_B = X_AB.R.transpose() * (v_A + w_A.cross(X_AB.p)), w_B = X_AB.R.transpose() * w_A;
+    const Wrench F_Ao_A = transfer(X_AB, F_Bo_B);
+    ASSERT_NEAR(F_Ao_A.f.dot(v_A) + F_Ao_A.n.dot(w_A), F_Bo_B.f.dot(v_B) + F_Bo_B.n.dot(w_B), 1e-12);
+  }
+}
+
+struct Mode {
+  const char* name;
+  double k, c, T;
+};
+std::ostream& operator<<(std::ostream& out, const Mode& mode) { return out << mode.name; }
+
+class Discretise : public testing::TestWithParam<Mode> {};
+
+TEST_P(Discretise, MatchesTheMatrixExponential) {  // van Loan: exp([A B; 0 0] T)
+  const auto [name, k, c, T] = GetParam();
+  using Wide = Eigen::Matrix<long double, 3, 3>;
+  Wide M = Wide::Zero();
+  M.topLeftCorner<2, 2>() << 0, 1, -k, -c;
+  M(1, 2) = 1.0;
+  const Wide wide = (M * static_cast<long double>(T)).exp();
+  const Eigen::Matrix3d oracle = wide.cast<double>();
+  const SecondOrderHold hold = discretise(k, c, T);
+  EXPECT_LT((hold.Phi - oracle.topLeftCorner<2, 2>()).norm(), 1e-12 * hold.Phi.norm());
+  EXPECT_NEAR(hold.Gamma(0), oracle(0, 2), 1e-12 * std::abs(oracle(0, 2)));
+  EXPECT_NEAR(hold.Gamma(1), oracle(1, 2), 1e-12 * std::abs(oracle(1, 2)) + 1e-18);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Modes, Discretise,
+    testing::Values(Mode{"table_4_1_x", 3.0, 1.0, 0.01}, Mode{"srms", 0.5, 0.028, 0.01},
+                    Mode{"undamped", 40.0, 0.0, 0.01}, Mode{"undamped_long", 40.0, 0.0, 3.0},
+                    Mode{"critical", 100.0, 20.0, 0.01}, Mode{"critical_long", 100.0, 20.0, 0.5},
+                    Mode{"just_over", 100.0, 20.0 * (1 + 1e-9), 0.01},
+                    Mode{"just_under", 100.0, 20.0 * (1 - 1e-9), 0.01},
+                    Mode{"overdamped", 4.0, 50.0, 0.01}, Mode{"overdamped_long", 4.0, 50.0, 5.0},
+                    Mode{"weak_spring_strong_damper", 1e-9, 300.0, 0.1},
+                    Mode{"free", 0.0, 0.0, 0.01}, Mode{"free_damped", 0.0, 2.0, 0.01},
+                    Mode{"free_stiff_damper", 0.0, 2000.0, 0.01},
+                    Mode{"very_slow", 1e-12, 1e-8, 0.001}, Mode{"fast", 1e6, 60.0, 0.01},
+                    Mode{"step_of_one", 1.0, 0.1, 1.0}, Mode{"edge_series", 1.0001, 1.9, 1.0}),
+    [](const auto& test) { return test.param.name; });
+
+/// State space of a Butterworth filter, driven by a straight line: exp on the state beside the line.
+template <int Order>
+double exactRamp(double w, double y_rest, double u0, double u1, double dt) {
+  // Companion form of the denominator; states are y and its derivatives.
+  using Wide = long double;
+  Eigen::Matrix<Wide, Order + 2, Order + 2> M = Eigen::Matrix<Wide, Order + 2, Order + 2>::Zero();
+  const double coefficients2[] = {w * w, M_SQRT2 * w}, coefficients3[] = {w * w * w, 2 * w * w, 2 * w};
+  for (int i = 0; i + 1 < Order; ++i) M(i, i + 1) = 1.0;
+  for (int i = 0; i < Order; ++i) M(Order - 1, i) = -(Order == 2 ? coefficients2 : coefficients3)[i];
+  M(Order - 1, Order) = std::pow(w, Order);  // input u
+  M(Order, Order + 1) = 1.0;                 // u' = slope
+  Eigen::Matrix<Wide, Order + 2, 1> state = Eigen::Matrix<Wide, Order + 2, 1>::Zero();
+  state(0) = y_rest;
+  state(Order) = u0;
+  state(Order + 1) = (u1 - u0) / dt;
+  return static_cast<double>(((M * static_cast<Wide>(dt)).exp() * state)(0));
+}
+
+TEST(Butterworth, FollowsAStraightLineExactly) {
+  const double w = 2 * M_PI * 20, rest = 0.4, u1 = 1.7;
+  for (double dt : {1e-6, 1.023e-3, 0.02, 0.3}) {
+    Butterworth2<1> second(w);
+    Butterworth3<1> third(w);
+    const Eigen::Array<double, 1, 1> start(rest), end(u1);
+    second.settle(start);
+    third.settle(start);
+    second.advance(second.prepare(dt), end);
+    third.advance(third.prepare(dt), end);
+    // A jump within a microsecond is a slope of 10^6: its lag cancels, four digits go.
+    EXPECT_NEAR(second.output()(0), exactRamp<2>(w, rest, rest, u1, dt), 1e-11) << dt;
+    EXPECT_NEAR(third.output()(0), exactRamp<3>(w, rest, rest, u1, dt), 1e-11) << dt;
+  }
+}
+
+TEST(Butterworth, StepsOfAnyLengthAgree) {  // one long straight line, cut anywhere
+  const double w = 30.0;
+  Butterworth2<1> one2(w), many2(w);
+  Butterworth3<1> one3(w), many3(w);
+  const auto u = [](double t) { return Eigen::Array<double, 1, 1>(0.5 + 2.0 * t); };
+  for (auto* f : {&one2, &many2}) f->settle(u(0));
+  for (auto* f : {&one3, &many3}) f->settle(u(0));
+  one2.advance(one2.prepare(0.2), u(0.2));
+  one3.advance(one3.prepare(0.2), u(0.2));
+  double t = 0.0;
+  for (double dt : {0.001, 0.05, 0.0003, 0.1, 0.0487}) {
+    t += dt;
+    many2.advance(many2.prepare(dt), u(t));
+    many3.advance(many3.prepare(dt), u(t));
+  }
+  EXPECT_NEAR(one2.output()(0), many2.output()(0), 1e-12);
+  EXPECT_NEAR(one3.output()(0), many3.output()(0), 1e-12);
+}
+
+TEST(Butterworth, HeldInputHasUnitGain) {
+  Butterworth2<1> filter(50.0);
+  const Eigen::Array<double, 1, 1> zero(0.0), held(2.5);
+  for (int i = 0; i < 1000; ++i) filter.advance(filter.prepare(0.001), zero, held);
+  EXPECT_NEAR(filter.output()(0), 2.5, 1e-12);
+}
+
+TEST(Quintic, MeetsBothEnds) {
+  PathPoint<2> from;
+  from.x << 0.3, -1.0;
+  from.x_dot << 0.5, 2.0;
+  from.x_ddot << -1.0, 4.0;
+  const Eigen::Vector2d to(1.0, 0.5);
+  const Quintic<2> path(from, to, 2.5);
+  const PathPoint<2> a = path.at(0.0), b = path.at(2.5 * (1 - 1e-12)), after = path.at(9.0);
+  EXPECT_LT((a.x - from.x).norm() + (a.x_dot - from.x_dot).norm() + (a.x_ddot - from.x_ddot).norm(),
+            1e-14);
+  EXPECT_LT((b.x - to).norm() + b.x_dot.norm() + b.x_ddot.norm(), 1e-9);
+  EXPECT_EQ(after.x, to);
+  EXPECT_EQ(after.x_dot.norm(), 0.0);
+}
+
+TEST(Quintic, RatesAreDerivatives) {
+  PathPoint<1> from;
+  from.x_dot(0) = 1.0;
+  const Quintic<1> path(from, Eigen::Matrix<double, 1, 1>(2.0), 3.0);
+  const double h = 1e-5;
+  for (double t = 0.1; t < 2.9; t += 0.1) {
+    EXPECT_NEAR(path.at(t).x_dot(0), (path.at(t + h).x(0) - path.at(t - h).x(0)) / (2 * h), 1e-8);
+    EXPECT_NEAR(path.at(t).x_ddot(0), (path.at(t + h).x_dot(0) - path.at(t - h).x_dot(0)) / (2 * h),
+                1e-8);
+  }
+}
+
+}  // namespace
+}  // namespace ves

@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// The programs as a person or a script meets them: exit statuses, messages, files, two processes.
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "ves/transport/bus.hpp"
+#include "ves/transport/channels.hpp"
+#include "ves/transport/event_log.hpp"
+
+namespace ves {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Output {
+  int status;
+  std::string text;  // both streams
+};
+
+Output sh(const std::string& command) {
+  Output out{-1, ""};
+  std::FILE* pipe = popen(("( " + command + " ) 2>&1 </dev/null").c_str(), "r");
+  std::array<char, 4096> buffer;
+  while (std::size_t n = fread(buffer.data(), 1, buffer.size(), pipe)) out.text.append(buffer.data(), n);
+  const int status = pclose(pipe);
+  out.status = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  return out;
+}
+
+class Programs : public testing::Test {
+ protected:
+  void SetUp() override {
+    setenv("VES_CONFIG_DIR", VES_TEST_CONFIG_DIR, 1);
+    folder_ = fs::temp_directory_path() /
+              ("ves_programs_" + std::to_string(getpid()) +
+               testing::UnitTest::GetInstance()->current_test_info()->name());
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  static std::string app(const std::string& name) {
+    return std::string(VES_TEST_APP_DIR) + "/ves-" + name + " ";
+  }
+  Output run(const std::string& arguments) { return sh(app("run") + arguments); }
+  std::string out(const std::string& name) { return " --out " + (folder_ / name).string() + " "; }
+
+  static nlohmann::json summary(const fs::path& folder) {
+    std::ifstream in(folder / "summary.json");
+    return nlohmann::json::parse(in);
+  }
+  /// Commands of a log, in order.
+  static std::vector<std::array<std::int32_t, 8>> commands(const fs::path& folder) {
+    std::vector<std::array<std::int32_t, 8>> all;
+    LogReader reader((folder / "run.lcmlog").string());
+    LogEvent event;
+    while (reader.next(event))
+      if (event.channel == channel::kLegCommand) {
+        const auto m = event.as<leg_command_t>();
+        all.push_back({m->counts[0], m->counts[1], m->counts[2], m->counts[3], m->counts[4],
+                       m->counts[5], m->engaged, m->segment});
+      }
+    return all;
+  }
+  fs::path folder_;
+};
+
+TEST_F(Programs, LockstepRunLeavesItsFiles) {
+  const Output o = run("z_sine --lockstep --seed 3" + out("a"));
+  EXPECT_EQ(o.status, 0) << o.text;
+  EXPECT_NE(o.text.find("z error"), std::string::npos) << o.text;
+  for (const char* file : {"run.lcmlog", "series.csv", "summary.json", "experiment.yaml", "pose.png",
+                           "error.png", "legs.png"})
+    EXPECT_TRUE(fs::exists(folder_ / "a" / file)) << file;
+  const auto s = summary(folder_ / "a");
+  EXPECT_EQ(s["seed"], 3);
+  EXPECT_EQ(s["ended"], "parked");
+  EXPECT_TRUE(s["z_error_max_extending_m"].is_number());
+  EXPECT_TRUE(s["real_time_factor"].is_number());
+  EXPECT_EQ(s["configuration_hash"].get<std::string>().size(), 16u);
+  // The resolved experiment is a scenario like any other.
+  EXPECT_EQ(run((folder_ / "a/experiment.yaml").string() + " --lockstep --no-plots" + out("b")).status, 0);
+  EXPECT_EQ(commands(folder_ / "a"), commands(folder_ / "b"));
+}
+
+TEST_F(Programs, TrippedRunEndsWithOne) {
+  const Output o = run("z_sine --lockstep --no-plots --set safety.position_error_m=0.03" + out("a"));
+  EXPECT_EQ(o.status, 1) << o.text;
+  EXPECT_NE(o.text.find("by: position error"), std::string::npos) << o.text;
+  EXPECT_EQ(summary(folder_ / "a")["first_cause"], "position error");
+}
+
+TEST_F(Programs, BadInputIsOneLineAndStatusTwo) {
+  const std::string blocked = (folder_ / "file").string();
+  std::ofstream(blocked) << "x";
+  for (const std::string& arguments :
+       {std::string("no_such_scenario --lockstep"), std::string("z_sine --fast"),
+        std::string("z_sine --lockstep --set legs.tau_s=nan"), std::string("z_sine --seed -4"),
+        std::string("z_sine --seed abc"), std::string(""), std::string("/no/such.yaml --lockstep"),
+        std::string("z_sine --lockstep --out " + blocked), std::string("z_sine --url nonsense"),
+        std::string("z_sine --lockstep --set program=[]")}) {
+    const Output o = run(arguments);
+    EXPECT_EQ(o.status, 2) << arguments << ": " << o.text;
+    EXPECT_EQ(std::count(o.text.begin(), o.text.end(), '\n'), 1) << arguments << ": " << o.text;
+  }
+  EXPECT_NE(run("no_such_scenario").text.find("want one of alpha_sine, doss_on_table_4_1"),
+            std::string::npos);
+}
+
+TEST_F(Programs, HelpIsNoError) {
+  for (const char* name : {"run", "demo", "controller", "plant"}) {
+    const Output o = sh(app(name) + "--help");
+    EXPECT_EQ(o.status, 0);
+    EXPECT_NE(o.text.find("Usage"), std::string::npos) << o.text;
+  }
+}
+
+TEST_F(Programs, TwoProcessesInLockstepCommandWhatOneDoes) {
+  EXPECT_EQ(run("puma_on_table_4_1 --lockstep --no-plots" + out("one")).status, 0);
+  const Output o =
+      run("puma_on_table_4_1 --lockstep --two-processes --private-bus --no-plots" + out("two"));
+  EXPECT_EQ(o.status, 0) << o.text;
+  const auto one = commands(folder_ / "one"), two = commands(folder_ / "two");
+  EXPECT_GT(one.size(), 1900u);
+  EXPECT_EQ(one, two);
+}
+
+TEST_F(Programs, RealTimeRunOfTwoProcesses) {
+  const Output o = run("z_sine --private-bus --no-plots --set "
+                       "'program=[{calibration: {}},{trajectory: {duration_s: 1, z: {sine: "
+                       "{amplitude_m: 0.05, frequency_hz: 1}}}}]'" + out("a"));
+  EXPECT_EQ(o.status, 0) << o.text;
+  const auto s = summary(folder_ / "a");
+  EXPECT_EQ(s["ended"], "parked");
+  EXPECT_NEAR(s["z_peak_to_peak_m"].get<double>(), 0.1, 1e-3);
+  EXPECT_TRUE(s.contains("wake_up_late_median_s"));
+}
+
+/// A program that runs beside the test, on the test's own private bus.
+class Child {
+ public:
+  explicit Child(const std::vector<std::string>& words) {
+    pid_ = fork();
+    if (pid_ == 0) {
+      std::vector<char*> argv;
+      for (const std::string& w : words) argv.push_back(const_cast<char*>(w.c_str()));
+      argv.push_back(nullptr);
+      if (!freopen("/dev/null", "w", stderr)) _exit(126);
+      execv(argv[0], argv.data());
+      _exit(127);
+    }
+  }
+  ~Child() {
+    if (pid_ > 0) {
+      kill(pid_, SIGKILL);
+      waitpid(pid_, nullptr, 0);
+    }
+  }
+  bool running() {
+    if (pid_ > 0 && waitpid(pid_, &status_, WNOHANG) == pid_) pid_ = 0;
+    return pid_ > 0;
+  }
+  int wait() {
+    if (pid_ > 0) waitpid(pid_, &status_, 0);
+    pid_ = 0;
+    return WIFEXITED(status_) ? WEXITSTATUS(status_) : -1;
+  }
+  void signal(int number) { kill(pid_, number); }
+
+ private:
+  pid_t pid_ = 0;
+  int status_ = 0;
+};
+
+TEST_F(Programs, SecondControllerRefusesToArmAndTheFirstGoesOn) {
+  enterPrivateBus();
+  Bus bus(kDefaultUrl);
+  std::int64_t engaged = 0;
+  std::set<std::int64_t> commanders;
+  Phase phase = Phase::kDisarmed;
+  std::int64_t first_source = 0;
+  bus.subscribe(channel::kLegCommand, [&](const std::string&, const void* data, std::uint32_t size) {
+    const auto m = decode<leg_command_t>(data, size);
+    if (!m || !m->engaged) return;
+    ++engaged;
+    commanders.insert(m->header.source);
+    if (first_source == 0) first_source = m->header.source;
+  });
+  bus.subscribe(channel::kState, [&](const std::string&, const void* data, std::uint32_t size) {
+    const auto m = decode<state_t>(data, size);
+    if (m && m->header.source == first_source) phase = static_cast<Phase>(m->phase);
+  });
+  const std::string dir = std::string(VES_TEST_APP_DIR) + "/ves-";
+  Child plant({dir + "plant", "puma_on_table_4_1"});
+  Child first({dir + "controller", "puma_on_table_4_1"});
+  while (engaged < 50 && bus.wait(10'000)) {
+  }
+  ASSERT_GE(engaged, 50);
+  Child second({dir + "controller", "puma_on_table_4_1"});
+  // It gives up after five seconds disarmed; listen meanwhile.
+  while (second.running()) bus.wait(100);
+  EXPECT_EQ(second.wait(), 1);
+  EXPECT_EQ(commanders.size(), 1u);
+  EXPECT_EQ(phase, Phase::kRunning);
+  // Ctrl-C: home, parked, status 0.
+  first.signal(SIGINT);
+  EXPECT_EQ(first.wait(), 0);
+  bus.drain();
+  EXPECT_EQ(phase, Phase::kParked);
+}
+
+}  // namespace
+}  // namespace ves

@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <kdl/chainidsolver_recursive_newton_euler.hpp>
+#include <random>
+
+#include "support/poses.hpp"
+#include "support/robots.hpp"
+#include "ves/robot/newton_euler.hpp"
+
+namespace ves {
+namespace {
+
+constexpr double kG = 9.81;
+
+/// Joints that swing, each its own way, with exact derivatives.
+JointState jointSwing(int joints, double t) {
+  JointState s;
+  for (int i = 0; i < joints; ++i) {
+    const double w = 1.0 + 0.3 * i, a = 0.8 - 0.05 * i, phase = 0.7 * i;
+    s.q(i) = a * std::sin(w * t + phase);
+    s.q_dot(i) = a * w * std::cos(w * t + phase);
+    s.q_ddot(i) = -a * w * w * std::sin(w * t + phase);
+  }
+  return s;
+}
+
+/// A revolute-prismatic-revolute arm with skew axes, for what no table robot has.
+RobotModel skewRobot() {
+  RobotModel robot;
+  robot.joints = 3;
+  robot.base = {3.0, {0.1, -0.05, 0.2}, Vec3(0.1, 0.2, 0.15).asDiagonal()};
+  for (int i = 0; i < 3; ++i) {
+    Link& link = robot.links[static_cast<std::size_t>(i)];
+    link.type = i == 1 ? JointType::kPrismatic : JointType::kRevolute;
+    link.X_parent = {rotation({0.3 * i, -0.4, 0.2 + i}), {0.2, 0.1 * i, 0.3}};
+    link.axis = Vec3(0.2, -0.5 * i, 1.0).normalized();
+    link.body = {2.0 + i, {0.05, 0.1, -0.2 * i}, Vec3(0.05, 0.06, 0.07).asDiagonal()};
+  }
+  return robot;
+}
+
+/// Momentum of the robot about the origin of I, from poses alone.
+Vec6 momentum(const RobotModel& robot, const test::Swing& base, const Transform& X_PL0, double t) {
+  const auto poseOf = [&](int body, double s) {
+    Transform X = base.motion(s).X * X_PL0;
+    const JointState q = jointSwing(robot.joints, s);
+    for (int i = 0; i < body; ++i) X = X * linkPose(robot.link(i), q.q(i));
+    return X;
+  };
+  const double h = 1e-3;  // five-point stencil: error h^4
+  Vec6 sum = Vec6::Zero();
+  for (int body = 0; body <= robot.joints; ++body) {
+    const RigidBody& b = body == 0 ? robot.base : robot.link(body - 1).body;
+    const auto com = [&](double s) { return Vec3(poseOf(body, s) * b.p_BoBcm_B); };
+    const auto R = [&](double s) { return poseOf(body, s).R; };
+    const Vec3 v = (com(t - 2 * h) - 8 * com(t - h) + 8 * com(t + h) - com(t + 2 * h)) / (12 * h);
+    const Mat3 W = (R(t - 2 * h) - 8 * R(t - h) + 8 * R(t + h) - R(t + 2 * h)) / (12 * h) *
+                   R(t).transpose();
+    const Vec3 w(0.5 * (W(2, 1) - W(1, 2)), 0.5 * (W(0, 2) - W(2, 0)), 0.5 * (W(1, 0) - W(0, 1)));
+    const Mat3 I_I = R(t) * b.I_Bcm_B * R(t).transpose();
+    sum.head<3>() += b.mass * v;
+    sum.tail<3>() += I_I * w + com(t).cross(b.mass * v);
+  }
+  return sum;
+}
+
+double totalMass(const RobotModel& robot) {
+  double mass = robot.base.mass;
+  for (int i = 0; i < robot.joints; ++i) mass += robot.link(i).body.mass;
+  return mass;
+}
+
+class MovingBase : public testing::TestWithParam<const char*> {};
+
+TEST_P(MovingBase, WrenchIsTheRateOfMomentum) {  // Appendix A with link 0 and a base that moves
+  const std::string name = GetParam();
+  const RobotModel robot = name == "skew" ? skewRobot() : test::robot(name).model;
+  const Transform X_PL0{rotation({0.1, -0.2, 0.5}), {0.05, -0.1, 0.12}};
+  const double h = 1e-3;
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    const test::Swing base(seed);
+    for (double t = 0.3; t < 2.0; t += 0.4) {
+      const auto p = [&](double s) { return momentum(robot, base, X_PL0, s); };
+      const Vec6 rate = (p(t - 2 * h) - 8 * p(t - h) + 8 * p(t + h) - p(t + 2 * h)) / (12 * h);
+
+      const BodyMotion P = base.motion(t);
+      const Wrench F_L0o_L0 =
+          newtonEuler(robot, jointSwing(robot.joints, t), feltMotion(P, X_PL0, Vec3::Zero())).F_L0o_L0;
+      const Wrench F_Io_I = transfer(P.X * X_PL0, F_L0o_L0);
+      ASSERT_LT((F_Io_I.stacked() - rate).norm(), 1e-6 * (1.0 + rate.norm()));
+    }
+  }
+}
+
+TEST_P(MovingBase, GravityIsAnUpwardAcceleration) {
+  const std::string name = GetParam();
+  const RobotModel robot = name == "skew" ? skewRobot() : test::robot(name).model;
+  const test::Swing base(2);
+  const BodyMotion P = base.motion(0.7);
+  const Vec3 g_I(0.0, 0.0, -kG);
+  const JointState q = jointSwing(robot.joints, 0.7);
+  const Wrench with = newtonEuler(robot, q, feltMotion(P, {}, g_I)).F_L0o_L0;
+  const Wrench without = newtonEuler(robot, q, feltMotion(P, {}, Vec3::Zero())).F_L0o_L0;
+  const Vec3 extra = P.X.R * (with.f - without.f);
+  EXPECT_LT((extra + totalMass(robot) * g_I).norm(), 1e-9);
+}
+
+INSTANTIATE_TEST_SUITE_P(Robots, MovingBase, testing::Values("puma560", "doss", "skew"),
+                         [](const auto& test) { return std::string(test.param); });
+
+class JointEfforts : public testing::TestWithParam<const char*> {};
+
+TEST_P(JointEfforts, EqualKdlOnAFixedBase) {
+  const RobotModel robot = test::robot(GetParam()).model;
+  const KDL::Chain chain = test::kdlChain(GetParam());
+  const auto n = static_cast<unsigned>(robot.joints);
+  ASSERT_EQ(chain.getNrOfJoints(), n);
+  KDL::ChainIdSolver_RNE solver(chain, KDL::Vector(0, 0, -kG));
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> u(-3.0, 3.0);
+  FeltMotion base;
+  base.a = {0.0, 0.0, kG};
+  for (int k = 0; k < 1000; ++k) {
+    KDL::JntArray q(n), qd(n), qdd(n), tau(n);
+    JointState s;
+    for (unsigned i = 0; i < n; ++i) {
+      s.q(i) = q(i) = u(random);
+      s.q_dot(i) = qd(i) = u(random);
+      s.q_ddot(i) = qdd(i) = u(random);
+    }
+    ASSERT_GE(solver.CartToJnt(q, qd, qdd, KDL::Wrenches(chain.getNrOfSegments(), KDL::Wrench::Zero()),
+                               tau), 0);
+    const JointVector ours = newtonEuler(robot, s, base).tau;
+    for (unsigned i = 0; i < n; ++i) ASSERT_NEAR(ours(i), tau(i), 1e-10 * (1.0 + std::abs(tau(i))));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Robots, JointEfforts, testing::Values("puma560", "doss"),
+                         [](const auto& test) { return std::string(test.param); });
+
+/// Gravity torques in closed form (Armstrong, Khatib and Burdick's frames) with Table 2.1's masses.
+struct PumaGravity {
+  double g1, g2, g3, g4, g5;
+  PumaGravity() {
+    const double m2 = 17.4, m3 = 4.8, m4 = 0.82, m5 = 0.34, m6 = 0.09;
+    const double a2 = 0.4318, a3 = -0.0203, d4 = 0.4331;
+    g1 = -kG * (m2 * 0.068 + (m3 + m4 + m5 + m6) * a2);
+    g2 = -kG * (m3 * 0.070 + m4 * (d4 - 0.019) + (m5 + m6) * d4);
+    g3 = kG * m2 * 0.006;
+    g4 = -kG * (m4 + m5 + m6) * a3;
+    g5 = -kG * m6 * 0.032;
+  }
+  JointVector torques(const JointVector& q) const {
+    const double s2 = std::sin(q(1)), c2 = std::cos(q(1));
+    const double s23 = std::sin(q(1) + q(2)), c23 = std::cos(q(1) + q(2));
+    const double s4 = std::sin(q(3)), c4 = std::cos(q(3)), s5 = std::sin(q(4)), c5 = std::cos(q(4));
+    const double wrist = g5 * (s23 * c5 + c23 * c4 * s5);
+    JointVector tau = JointVector::Zero();
+    tau(1) = g1 * c2 + g2 * s23 + g3 * s2 + g4 * c23 + wrist;
+    tau(2) = g2 * s23 + g4 * c23 + wrist;
+    tau(3) = -g5 * s23 * s4 * s5;
+    tau(4) = g5 * (c23 * s5 + s23 * c4 * c5);
+    return tau;
+  }
+};
+
+TEST(Puma, GravityTorquesAreTheClosedForm) {
+  const RobotModel robot = test::robot("puma560").model;
+  FeltMotion base;
+  base.a = {0.0, 0.0, kG};
+  std::mt19937 random(9);
+  std::uniform_real_distribution<double> u(-3.0, 3.0);
+  const PumaGravity closed;
+  for (int k = 0; k < 500; ++k) {
+    JointState s;
+    for (int i = 0; i < 6; ++i) s.q(i) = u(random);
+    ASSERT_LT((newtonEuler(robot, s, base).tau - closed.torques(s.q)).norm(), 1e-10);
+  }
+}
+
+TEST(Puma, WeighsWhatItsTableSays) {
+  const RobotModel robot = test::robot("puma560").model;
+  EXPECT_NEAR(totalMass(robot), 52.45, 1e-12);
+  // Base moment of links 1 to 6 about frame 0 in the ready pose, added up by hand.
+  RobotModel moving = robot;
+  moving.base = {};
+  FeltMotion base;
+  base.a = {0.0, 0.0, kG};
+  JointState ready;
+  ready.q.head<3>() << 0.0, -90 * kDegree, 90 * kDegree;
+  const Wrench F_L0o = newtonEuler(moving, ready, base).F_L0o_L0;
+  const Wrench F_frame0 = shift(F_L0o, {0.0, 0.0, 0.672});
+  EXPECT_NEAR(F_frame0.f.z(), 318.33, 0.01);
+  EXPECT_NEAR(F_frame0.n.x(), 60.31978, 1e-4);
+  EXPECT_NEAR(F_frame0.n.y(), -0.77524, 1e-4);
+}
+
+TEST(Combine, IsTheBodyItIsMadeOf) {  // a bar of two halves
+  RigidBody half;
+  half.mass = 3.0;
+  half.p_BoBcm_B = {0.5, 0.0, 0.0};
+  half.I_Bcm_B = Vec3(0.0, 3.0 / 12, 3.0 / 12).asDiagonal();
+  const RigidBody bar = combine(half, {rotation({0.0, 0.0, M_PI}), Vec3::Zero()}, half);
+  EXPECT_DOUBLE_EQ(bar.mass, 6.0);
+  EXPECT_LT(bar.p_BoBcm_B.norm(), 1e-15);
+  EXPECT_LT((bar.I_Bcm_B - Mat3(Vec3(0.0, 6.0 * 4 / 12, 6.0 * 4 / 12).asDiagonal())).norm(), 1e-14);
+}
+
+}  // namespace
+}  // namespace ves

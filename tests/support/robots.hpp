@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Robots for the tests, and KDL's chain of the same URDF by a route of its own.
+#pragma once
+
+#include <urdf_parser/urdf_parser.h>
+
+#include <fstream>
+#include <kdl/chain.hpp>
+#include <sstream>
+#include <string>
+
+#include "ves/config/urdf.hpp"
+
+namespace ves::test {
+
+inline std::string configDir() { return VES_TEST_CONFIG_DIR; }
+
+inline std::string readText(const std::string& file) {
+  std::ifstream in(file);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+inline UrdfRobot robot(const std::string& name) {
+  const std::string file = configDir() + "/robots/" + name + ".urdf";
+  return loadUrdf(readText(file), file);
+}
+
+/// The chain that KDL makes of the URDF, link by link, fixed joints as they are.
+inline KDL::Chain kdlChain(const std::string& name) {
+  const auto model = urdf::parseURDF(readText(configDir() + "/robots/" + name + ".urdf"));
+  KDL::Chain chain;
+  const auto frame = [](const urdf::Pose& p) {
+    return KDL::Frame(KDL::Rotation::Quaternion(p.rotation.x, p.rotation.y, p.rotation.z, p.rotation.w),
+                      KDL::Vector(p.position.x, p.position.y, p.position.z));
+  };
+  auto link = model->getRoot();
+  while (!link->child_joints.empty()) {
+    const urdf::Joint& joint = *link->child_joints[0];
+    link = model->getLink(joint.child_link_name);
+    const KDL::Frame f = frame(joint.parent_to_joint_origin_transform);
+    const KDL::Vector axis = f.M * KDL::Vector(joint.axis.x, joint.axis.y, joint.axis.z);
+    const urdf::Inertial& in = *link->inertial;
+    // Inertial frames are not turned in these files.
+    chain.addSegment(KDL::Segment(
+        link->name,
+        KDL::Joint(joint.name, f.p, axis,
+                   joint.type == urdf::Joint::PRISMATIC ? KDL::Joint::TransAxis : KDL::Joint::RotAxis),
+        f,
+        KDL::RigidBodyInertia(
+            in.mass, frame(in.origin).p,
+            KDL::RotationalInertia(in.ixx, in.iyy, in.izz, in.ixy, in.ixz, in.iyz))));
+  }
+  return chain;
+}
+
+}  // namespace ves::test

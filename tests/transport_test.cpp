@@ -1,0 +1,299 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstring>
+#include <filesystem>
+#include <random>
+
+#include "ves/config/document.hpp"
+#include "ves/transport/bus.hpp"
+#include "ves/transport/channels.hpp"
+#include "ves/transport/event_log.hpp"
+
+namespace ves {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string refusal(const std::function<void()>& read) {
+  try {
+    read();
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+Sample goodSample() {
+  Sample s;
+  s.sequence = 7;
+  s.time = 123;
+  s.adc = {1, -2, 32767, -32768, 5, 6, 7};
+  s.legs = {0, 16383, 8000, 8001, 8002, 8003};
+  s.q.head<3>() << 0.1, -0.2, 0.3;
+  s.switches = kAllSwitchesClosed;
+  return s;
+}
+
+TEST(Messages, SampleRoundTrips) {
+  const Sample s = goodSample();
+  const sample_t m = toMessage(s, {1, 2}, 5);
+  const auto back = fromMessage(m);
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->sequence, s.sequence);
+  EXPECT_EQ(back->adc, s.adc);
+  EXPECT_EQ(back->legs, s.legs);
+  EXPECT_EQ(back->q, s.q);
+  EXPECT_EQ(back->switches, s.switches);
+}
+
+TEST(Gate, LetsNothingOutOfRangeIn) {
+  const auto with = [](auto change) {
+    sample_t m = toMessage(goodSample(), {1, 2}, 0);
+    change(m);
+    return fromMessage(m).has_value();
+  };
+  EXPECT_TRUE(with([](sample_t&) {}));
+  EXPECT_FALSE(with([](sample_t& m) { m.adc[6] = 32768; }));
+  EXPECT_FALSE(with([](sample_t& m) { m.adc[0] = -32769; }));
+  EXPECT_FALSE(with([](sample_t& m) { m.legs[5] = 16384; }));
+  EXPECT_FALSE(with([](sample_t& m) { m.legs[0] = -1; }));
+  EXPECT_FALSE(with([](sample_t& m) { m.q[11] = NAN; }));
+  EXPECT_FALSE(with([](sample_t& m) { m.q[0] = INFINITY; }));
+  EXPECT_FALSE(with([](sample_t& m) { m.q[0] = 1e9; }));
+  EXPECT_FALSE(with([](sample_t& m) { m.header.sequence = -1; }));
+
+  LegCommand command;
+  const auto command_with = [&](auto change) {
+    leg_command_t m = toMessage(command, header({1, 2}, 0, 0));
+    change(m);
+    return fromMessage(m).has_value();
+  };
+  EXPECT_TRUE(command_with([](leg_command_t&) {}));
+  EXPECT_FALSE(command_with([](leg_command_t& m) { m.counts[3] = 16384; }));
+  EXPECT_FALSE(command_with([](leg_command_t& m) { m.counts[3] = -1; }));
+  EXPECT_FALSE(command_with([](leg_command_t& m) { m.engaged = 2; }));
+  EXPECT_FALSE(command_with([](leg_command_t& m) { m.segment = 1 << 20; }));
+
+  robot_command_t move{};
+  move.duration = 1.0;
+  EXPECT_TRUE(fromMessage(move));
+  move.target = NAN;
+  EXPECT_FALSE(fromMessage(move));
+  operator_t wish{};
+  wish.request = 3;
+  EXPECT_FALSE(fromMessage(wish));
+}
+
+TEST(Decode, TakesExactlyOneMessage) {
+  const sample_t m = toMessage(goodSample(), {1, 2}, 0);
+  std::vector<std::uint8_t> bytes(static_cast<std::size_t>(m.getEncodedSize()));
+  m.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  const auto n = static_cast<std::int64_t>(bytes.size());
+  EXPECT_TRUE(decode<sample_t>(bytes.data(), n));
+  for (std::int64_t k = 0; k < n; ++k) EXPECT_FALSE(decode<sample_t>(bytes.data(), k)) << k;
+  bytes.push_back(0);
+  EXPECT_FALSE(decode<sample_t>(bytes.data(), n + 1));
+  bytes[0] = static_cast<std::uint8_t>(bytes[0] ^ 1);  // of another version
+  EXPECT_FALSE(decode<sample_t>(bytes.data(), n));
+  EXPECT_FALSE(decode<leg_command_t>(bytes.data(), n));
+}
+
+// --- Log ------------------------------------------------------------------------------------------
+
+class Log : public testing::Test {
+ protected:
+  void SetUp() override {
+    file_ = fs::temp_directory_path() / ("ves_log_" + std::to_string(getpid()) + ".lcmlog");
+    LogWriter writer(file_.string());
+    for (int i = 0; i < 5; ++i) {
+      Sample s = goodSample();
+      s.sequence = i;
+      writer.write(channel::kSample, toMessage(s, {1, 2}, i), 1'000'000LL * i);
+    }
+  }
+  void TearDown() override { fs::remove(file_); }
+
+  std::string read() {
+    return refusal([&] {
+      LogReader reader(file_.string());
+      LogEvent event;
+      while (reader.next(event)) {
+      }
+    });
+  }
+  std::vector<char> bytes() {
+    std::ifstream in(file_, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+  }
+  void put(const std::vector<char>& bytes) {
+    std::ofstream(file_, std::ios::binary).write(bytes.data(), static_cast<long>(bytes.size()));
+  }
+  fs::path file_;
+};
+
+TEST_F(Log, ReadsWhatWasWritten) {
+  LogReader reader(file_.string());
+  LogEvent event;
+  for (int i = 0; i < 5; ++i) {
+    ASSERT_TRUE(reader.next(event));
+    EXPECT_EQ(event.channel, "VES_SAMPLE");
+    EXPECT_EQ(event.time_us, 1000 * i);
+    const auto sample = event.as<sample_t>();
+    ASSERT_TRUE(sample);
+    EXPECT_EQ(sample->header.sequence, i);
+  }
+  EXPECT_FALSE(reader.next(event));
+}
+
+TEST_F(Log, DamageIsNamedWithItsByte) {
+  const std::vector<char> good = bytes();
+  const std::size_t size = good.size() / 5;  // of an event
+  EXPECT_EQ(read(), "");
+
+  std::vector<char> bad = good;
+  bad[size] = 'x';  // the second sync word
+  put(bad);
+  EXPECT_NE(read().find("byte " + std::to_string(size) + ": sync word"), std::string::npos);
+
+  bad = good;
+  std::memset(&bad[20], 0x7f, 4);  // length of a channel name that crashes LCM's reader
+  put(bad);
+  EXPECT_NE(read().find("byte 20: channel name of"), std::string::npos);
+
+  bad = good;
+  std::memset(&bad[24], 0xff, 4);
+  put(bad);
+  EXPECT_NE(read().find("byte 24: message of 4294967295 bytes"), std::string::npos);
+
+  bad.assign(good.begin(), good.end() - 3);
+  put(bad);
+  EXPECT_NE(read().find("cut short"), std::string::npos);
+  bad.assign(good.begin(), good.begin() + 10);
+  put(bad);
+  EXPECT_NE(read().find("byte 0: 10 bytes left"), std::string::npos);
+  put({});
+  EXPECT_NE(read().find("empty"), std::string::npos);
+  EXPECT_NE(refusal([&] { LogReader(fs::temp_directory_path().string()); }).find("not a file"),
+            std::string::npos);
+  EXPECT_NE(refusal([&] { LogReader("/no/such.lcmlog"); }).find("no such file"), std::string::npos);
+}
+
+TEST_F(Log, NoDamageEverCrashesTheReader) {
+  const std::vector<char> good = bytes();
+  std::mt19937 random(1);
+  for (int k = 0; k < 2000; ++k) {
+    std::vector<char> bad = good;
+    for (unsigned flips = 1 + random() % 8; flips > 0; --flips)
+      bad[random() % bad.size()] = static_cast<char>(random());
+    if (random() % 3 == 0) bad.resize(random() % bad.size());
+    put(bad);
+    const std::string message = read();
+    EXPECT_EQ(message.find('\n'), std::string::npos);
+  }
+}
+
+// --- Bus: inside a network of its own --------------------------------------------------------------
+
+class PrivateBus : public testing::Test {
+ protected:
+  static void SetUpTestSuite() { enterPrivateBus(); }
+
+  /// Lets both ends hear each other.
+  static void settle(Bus& a, Bus& b, const std::function<bool()>& done) {
+    for (int i = 0; i < 100 && !done(); ++i) {
+      a.wait(10);
+      b.wait(10);
+    }
+    ASSERT_TRUE(done());
+  }
+};
+
+TEST_F(PrivateBus, ControllerKeepsTheNewestSampleOfTheNewestPlant) {
+  Bus machine(kDefaultUrl), controller(kDefaultUrl);
+  ControllerLink link(controller, {9, 9});
+  const auto send = [&](std::int64_t sequence, std::int64_t epoch) {
+    Sample s = goodSample();
+    s.sequence = sequence;
+    machine.publish(channel::kSample, toMessage(s, {1, epoch}, 0));
+  };
+  send(5, 100);
+  settle(machine, controller, [&] { return link.sample().sequence == 5; });
+  send(4, 100);  // late
+  send(9, 50);   // a ghost
+  sample_t broken = toMessage(goodSample(), {1, 100}, 0);
+  broken.header.sequence = 8;
+  broken.q[0] = NAN;
+  machine.publish(channel::kSample, broken);
+  settle(machine, controller, [&] { return link.rejected() == 3; });
+  EXPECT_EQ(link.sample().sequence, 5);
+  send(0, 200);  // the plant was started anew
+  settle(machine, controller, [&] { return link.sample().sequence == 0; });
+}
+
+TEST_F(PrivateBus, OneControllerHasTheLegs) {
+  Bus machine(kDefaultUrl), bus(kDefaultUrl);
+  PlantLink link(machine);
+  ControllerLink first(bus, {1, 1}), second(bus, {2, 1});
+  std::int64_t now = 0;
+  const auto send = [&](std::int64_t source, std::int64_t sequence, bool engaged) {
+    LegCommand c;
+    c.engaged = engaged;
+    c.counts.fill(static_cast<std::int32_t>(1000 * source));
+    bus.publish(channel::kLegCommand, toMessage(c, header({source, 1}, sequence, 0)));
+  };
+  const auto taken = [&] {
+    for (int i = 0; i < 20; ++i) machine.wait(10);
+    link.setTime(now);
+    const auto command = link.takeCommand();
+    return command ? command->first.counts[0] : 0;
+  };
+  send(1, 0, true);
+  EXPECT_EQ(taken(), 1000);
+  send(2, 0, true);
+  EXPECT_EQ(taken(), 0);  // refused
+  send(2, 1, false);
+  send(1, 1, true);
+  EXPECT_EQ(taken(), 1000);
+  send(1, 0, true);       // out of order
+  EXPECT_EQ(taken(), 0);
+  now += PlantLink::kSilence + 1;
+  link.setTime(now);
+  send(2, 2, true);       // the first is silent
+  EXPECT_EQ(taken(), 2000);
+  for (int i = 0; i < 20; ++i) bus.wait(10);
+  EXPECT_TRUE(first.takeRival());
+  EXPECT_TRUE(second.takeRival());
+  EXPECT_FALSE(first.takeRival());
+}
+
+TEST_F(PrivateBus, RandomBytesOnEveryChannelAreNobodys) {
+  Bus machine(kDefaultUrl), bus(kDefaultUrl);
+  PlantLink plant(machine);
+  ControllerLink controller(bus, {1, 1});
+  lcm::LCM raw(kDefaultUrl);
+  std::mt19937 random(3);
+  std::int64_t sent = 0;
+  for (int k = 0; k < 3000; ++k) {
+    std::vector<std::uint8_t> noise(random() % 600);
+    for (auto& b : noise) b = static_cast<std::uint8_t>(random());
+    for (const std::string& channel : {channel::kSample, channel::kLegCommand, channel::kOperator,
+                                       channel::kRobot}) {
+      raw.publish(channel, noise.data(), static_cast<unsigned>(noise.size()));
+      ++sent;
+    }
+    machine.drain();
+    bus.drain();
+  }
+  for (int i = 0; i < 50; ++i) {
+    machine.wait(2);
+    bus.wait(2);
+  }
+  EXPECT_GT(plant.rejected() + controller.rejected(), sent / 2);
+  EXPECT_FALSE(plant.takeCommand());
+  EXPECT_EQ(controller.sample().sequence, -1);
+}
+
+}  // namespace
+}  // namespace ves
