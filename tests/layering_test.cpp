@@ -27,6 +27,7 @@ const std::map<std::string, Names> kMayInclude = {
     {"realtime", {"config"}},
     {"transport", {"math", "kinematics", "robot", "control", "plant", "config"}},
     {"run", {"math", "kinematics", "robot", "control", "plant", "config", "transport", "realtime"}},
+    {"replay", {"math", "kinematics", "robot", "control", "plant", "config", "transport", "realtime"}},
     {"report",
      {"math", "kinematics", "robot", "control", "plant", "config", "transport", "realtime", "run"}},
 };

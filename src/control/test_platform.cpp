@@ -79,6 +79,7 @@ void TestPlatform::readSample(const TickInput& in) noexcept {
   state_.age = fresh ? 0 : state_.age + 1;
   fresh_ticks_ = fresh && !in.rival ? fresh_ticks_ + 1 : 0;
   state_.tick = in.tick;
+  ++state_.count;
   state_.sample_sequence = sample.sequence;
 
   state_.L_measured = legLengths(config_.legs, sample.legs);

@@ -66,6 +66,7 @@ leg_command_t toMessage(const LegCommand& command, const header_t& header) noexc
 state_t toMessage(const TickState& state, const TickInput& in, const header_t& header) noexcept {
   state_t m;
   m.header = header;
+  m.count = state.count;
   m.sample_sequence = state.sample_sequence;
   m.request = static_cast<std::int32_t>(in.request);
   m.rival = in.rival ? 1 : 0;

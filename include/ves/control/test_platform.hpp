@@ -94,6 +94,7 @@ struct TickInput {
 /// Everything one tick knew and decided.
 struct TickState {
   std::int64_t tick = 0;             // [-]
+  std::int64_t count = -1;           // [-] ticks run before this one
   std::int64_t sample_sequence = -1;  // [-] of the sample used
   Phase phase = Phase::kDisarmed;
   std::int32_t segment = -1;         // [-] of the program

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// ves replay: a recorded run through the controller once more.
+#include "app.hpp"
+#include "ves/replay/replay.hpp"
+
+int main(int argc, char** argv) {
+  using namespace ves;
+  CLI::App cli("Feeds the recorded samples of a log through the controller and tells what happened. "
+               "Needs nothing but the log.",
+               "ves replay");
+  std::string log, with;
+  bool check = false;
+  ReplayOptions options;
+  cli.add_option("log", log, "LCM event log of a run, or of lcm-logger beside one")->required();
+  cli.add_flag("--check", check, "compare every command and state bit for bit; differences: status 1");
+  cli.add_option("--speed", options.speed, "times real time; as fast as it goes by default")
+      ->check(CLI::Range(1e-3, 1e6));
+  cli.add_option("--with", with, "what would the controller have done with this scenario instead?");
+  return app::run(cli, argc, argv, [&] {
+    std::optional<Experiment> other;
+    if (!with.empty()) {
+      const char* config = std::getenv("VES_CONFIG_DIR");
+      other = loadExperiment(findScenario(with, config ? config : "config"));
+      options.with = &*other;
+    }
+    Phase phase = Phase::kDisarmed;
+    std::int32_t segment = -1;
+    const ReplayResult r = replay(log, options, [&](const TickState& state) {
+      if (state.phase == phase && state.segment == segment) return;
+      phase = state.phase;
+      segment = state.segment;
+      fmt::print("  tick {:>7}  {}{}\n", state.tick, name(phase),
+                 phase == Phase::kRunning ? fmt::format(", segment {}", segment + 1) : "");
+    });
+    fmt::print("{}: {} (configuration {}, version {}), {} ticks replayed\n", log, r.name, r.hash,
+               r.version, r.ticks);
+    if (r.cause != Check::kCount)
+      fmt::print("stopped in tick {} by: {}\n", r.cause_tick, name(r.cause));
+    if (other)
+      fmt::print("with {}: commanded pose differs by at most {:.3f} {:.3f} {:.3f} mm, {:.4f} {:.4f} "
+                 "{:.4f} deg\n",
+                 other->name, r.pose_difference(0) * 1e3, r.pose_difference(1) * 1e3,
+                 r.pose_difference(2) * 1e3, r.pose_difference(3) / kDegree,
+                 r.pose_difference(4) / kDegree, r.pose_difference(5) / kDegree);
+    if (!check) return app::kDone;
+    fmt::print("{} of {} states and commands differ\n", r.different, r.messages);
+    if (r.first)
+      fmt::print("first in tick {} (byte {}): {} recorded {}, replayed {}\n", r.first->tick,
+                 r.first->offset, r.first->field, r.first->recorded, r.first->replayed);
+    return r.different == 0 ? app::kDone : app::kTripped;
+  });
+}
