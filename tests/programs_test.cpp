@@ -72,6 +72,42 @@ class Programs : public testing::Test {
   fs::path folder_;
 };
 
+/// A program that runs beside the test, on the test's own private bus.
+class Child {
+ public:
+  explicit Child(const std::vector<std::string>& words) {
+    pid_ = fork();
+    if (pid_ == 0) {
+      std::vector<char*> argv;
+      for (const std::string& w : words) argv.push_back(const_cast<char*>(w.c_str()));
+      argv.push_back(nullptr);
+      if (!freopen("/dev/null", "w", stderr)) _exit(126);
+      execv(argv[0], argv.data());
+      _exit(127);
+    }
+  }
+  ~Child() {
+    if (pid_ > 0) {
+      kill(pid_, SIGKILL);
+      waitpid(pid_, nullptr, 0);
+    }
+  }
+  bool running() {
+    if (pid_ > 0 && waitpid(pid_, &status_, WNOHANG) == pid_) pid_ = 0;
+    return pid_ > 0;
+  }
+  int wait() {
+    if (pid_ > 0) waitpid(pid_, &status_, 0);
+    pid_ = 0;
+    return WIFEXITED(status_) ? WEXITSTATUS(status_) : -1;
+  }
+  void signal(int number) { kill(pid_, number); }
+
+ private:
+  pid_t pid_ = 0;
+  int status_ = 0;
+};
+
 TEST_F(Programs, LockstepRunLeavesItsFiles) {
   const Output o = run("z_sine --lockstep --seed 3" + out("a"));
   EXPECT_EQ(o.status, 0) << o.text;
@@ -141,43 +177,51 @@ TEST_F(Programs, RealTimeRunOfTwoProcesses) {
   EXPECT_EQ(s["ended"], "parked");
   EXPECT_NEAR(s["z_peak_to_peak_m"].get<double>(), 0.1, 1e-3);
   EXPECT_TRUE(s.contains("wake_up_late_median_s"));
+  const Output again = sh(app("replay") + (folder_ / "a/run.lcmlog").string() + " --check");
+  EXPECT_EQ(again.status, 0) << again.text;
+  EXPECT_NE(again.text.find("0 of "), std::string::npos) << again.text;
 }
 
-/// A program that runs beside the test, on the test's own private bus.
-class Child {
- public:
-  explicit Child(const std::vector<std::string>& words) {
-    pid_ = fork();
-    if (pid_ == 0) {
-      std::vector<char*> argv;
-      for (const std::string& w : words) argv.push_back(const_cast<char*>(w.c_str()));
-      argv.push_back(nullptr);
-      if (!freopen("/dev/null", "w", stderr)) _exit(126);
-      execv(argv[0], argv.data());
-      _exit(127);
-    }
+TEST_F(Programs, ReplayRefusesWhatIsNoLog) {
+  std::ofstream(folder_ / "empty").close();
+  std::ofstream(folder_ / "text") << "this is not an event log, by its first byte";
+  for (const char* name : {"empty", "text", "none", ""}) {
+    const Output o = sh(app("replay") + (folder_ / name).string() + " --check");
+    EXPECT_EQ(o.status, 2) << o.text;
+    EXPECT_EQ(std::count(o.text.begin(), o.text.end(), '\n'), 1) << o.text;
   }
-  ~Child() {
-    if (pid_ > 0) {
-      kill(pid_, SIGKILL);
-      waitpid(pid_, nullptr, 0);
-    }
-  }
-  bool running() {
-    if (pid_ > 0 && waitpid(pid_, &status_, WNOHANG) == pid_) pid_ = 0;
-    return pid_ > 0;
-  }
-  int wait() {
-    if (pid_ > 0) waitpid(pid_, &status_, 0);
-    pid_ = 0;
-    return WIFEXITED(status_) ? WEXITSTATUS(status_) : -1;
-  }
-  void signal(int number) { kill(pid_, number); }
+}
 
- private:
-  pid_t pid_ = 0;
-  int status_ = 0;
-};
+TEST_F(Programs, LcmLoggerBesideARunReplaysToo) {
+  if (sh("command -v lcm-logger").status != 0) GTEST_SKIP() << "no lcm-logger";
+  enterPrivateBus();
+  const std::string file = (folder_ / "beside.lcmlog").string();
+  Bus bus(kDefaultUrl);
+  std::int64_t sequence = -1;
+  bus.subscribe(channel::kSample, [&](const std::string&, const void* data, std::uint32_t size) {
+    if (const auto m = decode<sample_t>(data, size)) sequence = m->header.sequence;
+  });
+  const std::string dir = std::string(VES_TEST_APP_DIR) + "/ves-";
+  Child logger({"/usr/bin/lcm-logger", "--quiet", std::string("--lcm-url=") + kDefaultUrl, file});
+  // The logger hears us once its file grows.
+  for (int i = 0; i < 200 && (!fs::exists(file) || fs::file_size(file) == 0); ++i) {
+    sample_t m{};
+    bus.publish("VES_HELLO", m);
+    bus.wait(20);
+  }
+  Child plant({dir + "plant", "z_sine"});
+  while (sequence < 10 && bus.wait(5000)) {
+  }
+  Child controller({dir + "controller", "z_sine", "--set",
+                    "program=[{trajectory: {duration_s: 1, z: {sine: {amplitude_m: 0.05, frequency_hz: 1}}}}]"});
+  EXPECT_EQ(controller.wait(), 0);
+  plant.signal(SIGTERM);
+  EXPECT_EQ(plant.wait(), 0);
+  logger.signal(SIGINT);
+  logger.wait();
+  const Output again = sh(app("replay") + file + " --check");
+  EXPECT_EQ(again.status, 0) << again.text;
+}
 
 TEST_F(Programs, SecondControllerRefusesToArmAndTheFirstGoesOn) {
   enterPrivateBus();

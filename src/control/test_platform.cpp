@@ -119,7 +119,7 @@ void TestPlatform::choosePhase(Request request) noexcept {
       beginSegment();
       break;
     case Phase::kReturning:
-      if (n_ > steps_) state_.phase = Phase::kParked;
+      if (n_ >= steps_) state_.phase = Phase::kParked;
       break;
     case Phase::kParked:
     case Phase::kStopped:
@@ -131,7 +131,7 @@ bool TestPlatform::segmentIsOver() const noexcept {
   switch (segment().kind) {
     case SegmentKind::kCalibration: return calibration_.complete();
     case SegmentKind::kMove:
-    case SegmentKind::kTrajectory: return n_ > steps_;  // both ends are commanded
+    case SegmentKind::kTrajectory:
     case SegmentKind::kAdmittance: return n_ >= steps_;
   }
   return true;
@@ -199,14 +199,14 @@ PathPoint<6> TestPlatform::nextMotion(const Sample& sample) noexcept {
     case Phase::kArmed:
       return atRest(state_.measured.stacked());
     case Phase::kReturning:
-      return moveAt(n_++);
+      return moveAt(++n_);  // where it starts, the platform is already
     case Phase::kParked:
     case Phase::kStopped:
       return atRest(state_.motion.x);
     case Phase::kRunning:
       break;
   }
-  const std::int64_t n = n_++;
+  const std::int64_t n = ++n_;
   switch (segment().kind) {
     case SegmentKind::kCalibration:
       if (state_.age == 0 && sample.q.allFinite()) {

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// ves collect: the data collection routine, on a recorded run.
+#include <cmath>
+#include <fstream>
+#include <iostream>
+
+#include "app.hpp"
+#include "ves/report/series.hpp"
+
+int main(int argc, char** argv) {
+  using namespace ves;
+  CLI::App cli("Takes variables out of a log, as CSV with the unit in every column's name.",
+               "ves collect");
+  std::string log, out;
+  std::vector<std::string> select;
+  bool list = false;
+  double rate = 0.0, from = 0.0, duration = HUGE_VAL;
+  cli.add_option("log", log, "LCM event log of a run")->required();
+  cli.add_option("--select", select, "columns, or beginnings of their names: z_ fx_dynamic; all by default");
+  cli.add_flag("--list", list, "only the names of the columns");
+  cli.add_option("--rate", rate, "[Hz] rows per second; every tick by default")->check(CLI::Range(1e-6, 1e6));
+  cli.add_option("--from", from, "[s] since the first tick")->check(CLI::Range(0.0, 1e9));
+  cli.add_option("--duration", duration, "[s]; to the end by default")->check(CLI::Range(0.0, 1e9));
+  cli.add_option("--out", out, "file; standard output by default");
+  return app::run(cli, argc, argv, [&] {
+    const Series series = readSeries(log);
+    std::vector<Column> chosen;
+    std::vector<bool> used(select.size(), false);
+    for (const Column& column : columns(series.experiment)) {
+      bool take = select.empty() || column.name == "t_s";
+      for (std::size_t i = 0; i < select.size(); ++i)
+        if (column.name.rfind(select[i], 0) == 0) take = used[i] = true;
+      if (take) chosen.push_back(column);
+    }
+    for (std::size_t i = 0; i < select.size(); ++i)
+      if (!used[i])
+        throw InputError(fmt::format("--select {}: no column begins so; --list names them", select[i]));
+
+    std::ofstream file;
+    if (!out.empty()) {
+      file.open(out);
+      if (!file) throw InputError(fmt::format("--out {}: cannot be written", out));
+    }
+    std::ostream& to = out.empty() ? std::cout : file;
+    const char* between = list ? "\n" : ",";
+    for (std::size_t i = 0; i < chosen.size(); ++i) to << (i ? between : "") << chosen[i].name;
+    to << "\n";
+    double next = from;
+    for (const Row& row : series.rows) {
+      // Half a nanosecond: times are whole nanoseconds in seconds.
+      if (list || row.t < next - 0.5e-9 || row.t > from + duration) continue;
+      if (rate > 0.0) next += 1.0 / rate;
+      for (std::size_t i = 0; i < chosen.size(); ++i)
+        to << (i ? "," : "") << fmt::format("{}", chosen[i].value(row));
+      to << "\n";
+    }
+    to.flush();
+    if (!to) throw InputError(fmt::format("--out {}: cannot be written", out));
+    return app::kDone;
+  });
+}

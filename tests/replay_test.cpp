@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+
+#include "ves/replay/replay.hpp"
+#include "ves/run/run.hpp"
+#include "ves/transport/channels.hpp"
+
+namespace ves {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Replay : public testing::Test {
+ protected:
+  void SetUp() override {
+    log_ = temporary("log");
+    edited_ = temporary("edited");
+    LogWriter writer(log_);
+    runLockstep(experiment("puma_on_table_4_1"), &writer, nullptr);
+  }
+  void TearDown() override {
+    fs::remove(log_);
+    fs::remove(edited_);
+  }
+  static std::string temporary(const char* what) {
+    return (fs::temp_directory_path() / ("ves_replay_" + std::to_string(getpid()) + what)).string();
+  }
+  static Experiment experiment(const std::string& name, const std::vector<std::string>& set = {}) {
+    return loadExperiment(std::string(VES_TEST_CONFIG_DIR) + "/scenarios/" + name + ".yaml", set);
+  }
+
+  /// Copies the log, event by event; `edit` may change an event, or drop it by returning false.
+  void copy(const std::function<bool(LogEvent&)>& edit) {
+    LogReader reader(log_);
+    LogWriter writer(edited_);
+    LogEvent event;
+    while (reader.next(event))
+      if (edit(event))
+        writer.write(event.channel, event.data.data(), static_cast<std::int64_t>(event.data.size()),
+                     event.time_us * 1000);
+  }
+  static std::string refusal(const std::string& log) {
+    try {
+      replay(log, {}, nullptr);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  }
+  std::string log_, edited_;
+};
+
+TEST_F(Replay, RepeatsEveryStateAndCommand) {
+  const ReplayResult r = replay(log_, {}, nullptr);
+  EXPECT_GT(r.ticks, 1900);
+  EXPECT_EQ(r.messages, 2 * r.ticks);
+  EXPECT_EQ(r.different, 0);
+  EXPECT_EQ(r.phase, Phase::kParked);
+}
+
+TEST_F(Replay, OneFlippedBitInASampleIsFoundInItsTick) {
+  for (std::int64_t tick : {300, 700, 1500}) {
+    copy([&](LogEvent& event) {
+      if (event.channel != channel::kSample) return true;
+      auto m = *event.as<sample_t>();
+      if (m.answers != tick - 1) return true;
+      m.adc[2] ^= 1;
+      m.encode(event.data.data(), 0, static_cast<int>(event.data.size()));
+      return true;
+    });
+    const ReplayResult r = replay(edited_, {}, nullptr);
+    ASSERT_TRUE(r.first) << tick;
+    EXPECT_EQ(r.first->tick, tick);
+    EXPECT_EQ(r.first->field.rfind("state_t.total", 0), 0u) << r.first->field;
+    EXPECT_NE(r.first->recorded, r.first->replayed);
+  }
+}
+
+TEST_F(Replay, OneFlippedBitInACommandIsFoundInItsTick) {
+  copy([&](LogEvent& event) {
+    if (event.channel != channel::kLegCommand) return true;
+    auto m = *event.as<leg_command_t>();
+    if (m.header.sequence == 1234) m.counts[4] ^= 1;
+    m.encode(event.data.data(), 0, static_cast<int>(event.data.size()));
+    return true;
+  });
+  const ReplayResult r = replay(edited_, {}, nullptr);
+  EXPECT_EQ(r.different, 1);
+  ASSERT_TRUE(r.first);
+  EXPECT_EQ(r.first->tick, 1234);
+  EXPECT_EQ(r.first->field, "leg_command_t.counts[4]");
+}
+
+TEST_F(Replay, SaysWhatALogLacks) {
+  copy([](LogEvent& event) { return event.channel != channel::kExperiment; });
+  EXPECT_NE(refusal(edited_).find("before any configuration"), std::string::npos);
+  copy([](LogEvent& event) { return event.channel != channel::kState; });
+  EXPECT_NE(refusal(edited_).find("no tick of a controller"), std::string::npos);
+  int n = 0;
+  copy([&](LogEvent& event) { return event.channel != channel::kState || ++n > 57; });
+  EXPECT_NE(refusal(edited_).find("begins 57 ticks after its controller"), std::string::npos);
+  n = 0;
+  copy([&](LogEvent& event) { return event.channel != channel::kState || ++n != 57; });
+  EXPECT_NE(refusal(edited_).find("1 ticks before tick 57 are missing"), std::string::npos);
+  n = 0;
+  copy([&](LogEvent& event) { return event.channel != channel::kSample || ++n != 57; });
+  EXPECT_NE(refusal(edited_).find("tick 56 used sample 56, which is not in this log"),
+            std::string::npos);
+}
+
+TEST_F(Replay, AnotherConfigurationShowsWhatItWouldHaveDone) {
+  // A base twice as stiff in x, under the same measured wrenches.
+  const Experiment other =
+      experiment("puma_on_table_4_1", {"base.stiffness_diagonal=[3000, 2500, 4000, 1500, 1000, 2000]"});
+  ReplayOptions options;
+  options.with = &other;
+  const ReplayResult r = replay(log_, options, nullptr);
+  EXPECT_GT(r.pose_difference(0), 0.01);
+  EXPECT_LT(r.pose_difference(2), 1e-3);
+}
+
+}  // namespace
+}  // namespace ves
