@@ -3,11 +3,11 @@
 // What the programs share: their options, Ctrl-C, and the three exit statuses.
 #pragma once
 
+#include <fmt/format.h>
 #include <CLI/CLI.hpp>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
-#include <fmt/format.h>
 #include <string>
 #include <vector>
 
@@ -16,8 +16,8 @@
 
 namespace ves::app {
 
-inline constexpr int kDone = 0;      // the run went well
-inline constexpr int kTripped = 1;   // a check stopped it, or a comparison failed
+inline constexpr int kDone = 0;     // the run went well
+inline constexpr int kTripped = 1;  // a check stopped it, or a comparison failed
 inline constexpr int kBadInput = 2;
 
 inline volatile std::sig_atomic_t stop_requested = 0;

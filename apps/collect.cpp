@@ -17,9 +17,11 @@ int main(int argc, char** argv) {
   bool list = false;
   double rate = 0.0, from = 0.0, duration = HUGE_VAL;
   cli.add_option("log", log, "LCM event log of a run")->required();
-  cli.add_option("--select", select, "columns, or beginnings of their names: z_ fx_dynamic; all by default");
+  cli.add_option("--select", select,
+                 "columns, or beginnings of their names: z_ fx_dynamic; all by default");
   cli.add_flag("--list", list, "only the names of the columns");
-  cli.add_option("--rate", rate, "[Hz] rows per second; every tick by default")->check(CLI::Range(1e-6, 1e6));
+  cli.add_option("--rate", rate, "[Hz] rows per second; every tick by default")
+      ->check(CLI::Range(1e-6, 1e6));
   cli.add_option("--from", from, "[s] since the first tick")->check(CLI::Range(0.0, 1e9));
   cli.add_option("--duration", duration, "[s]; to the end by default")->check(CLI::Range(0.0, 1e9));
   cli.add_option("--out", out, "file; standard output by default");
@@ -35,7 +37,8 @@ int main(int argc, char** argv) {
     }
     for (std::size_t i = 0; i < select.size(); ++i)
       if (!used[i])
-        throw InputError(fmt::format("--select {}: no column begins so; --list names them", select[i]));
+        throw InputError(
+            fmt::format("--select {}: no column begins so; --list names them", select[i]));
 
     std::ofstream file;
     if (!out.empty()) {

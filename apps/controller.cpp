@@ -5,9 +5,10 @@
 
 int main(int argc, char** argv) {
   using namespace ves;
-  CLI::App cli("The controller (testPlatform) as a process: runs a scenario's program against the "
-               "machine on the bus.",
-               "ves controller");
+  CLI::App cli(
+      "The controller (testPlatform) as a process: runs a scenario's program against the "
+      "machine on the bus.",
+      "ves controller");
   app::Options options;
   options.addExperiment(cli);
   options.addBus(cli);
@@ -16,10 +17,9 @@ int main(int argc, char** argv) {
     if (options.private_bus) enterPrivateBus();
     app::catchSignals();
     const Experiment experiment = options.load();
-    const RunResult result =
-        runController(experiment, options.process, [](const TickState&) {
-          return app::stop_requested ? Request::kStop : Request::kNone;
-        });
+    const RunResult result = runController(experiment, options.process, [](const TickState&) {
+      return app::stop_requested ? Request::kStop : Request::kNone;
+    });
     if (result.good()) return app::kDone;
     if (result.phase == Phase::kDisarmed)
       fmt::print(stderr, "ves controller: not armed: {}\n", name(result.cause));

@@ -5,9 +5,10 @@
 
 int main(int argc, char** argv) {
   using namespace ves;
-  CLI::App cli("The main job, in real time: controller and plant as two processes over LCM, a PUMA 560 "
-               "on a compliant base, about 20 s.",
-               "ves demo");
+  CLI::App cli(
+      "The main job, in real time: controller and plant as two processes over LCM, a PUMA 560 "
+      "on a compliant base, about 20 s.",
+      "ves demo");
   app::RunnerOptions options;
   options.scenario = "puma_on_table_4_1";
   cli.add_option("--out", options.out, "folder for the results; a new one in ves-runs by default");

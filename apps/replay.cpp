@@ -1,19 +1,21 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // ves replay: a recorded run through the controller once more.
-#include "app.hpp"
 #include "ves/replay/replay.hpp"
+#include "app.hpp"
 
 int main(int argc, char** argv) {
   using namespace ves;
-  CLI::App cli("Feeds the recorded samples of a log through the controller and tells what happened. "
-               "Needs nothing but the log.",
-               "ves replay");
+  CLI::App cli(
+      "Feeds the recorded samples of a log through the controller and tells what happened. "
+      "Needs nothing but the log.",
+      "ves replay");
   std::string log, with;
   bool check = false;
   ReplayOptions options;
   cli.add_option("log", log, "LCM event log of a run, or of lcm-logger beside one")->required();
-  cli.add_flag("--check", check, "compare every command and state bit for bit; differences: status 1");
+  cli.add_flag("--check", check,
+               "compare every command and state bit for bit; differences: status 1");
   cli.add_option("--speed", options.speed, "times real time; as fast as it goes by default")
       ->check(CLI::Range(1e-3, 1e6));
   cli.add_option("--with", with, "what would the controller have done with this scenario instead?");
@@ -38,11 +40,12 @@ int main(int argc, char** argv) {
     if (r.cause != Check::kCount)
       fmt::print("stopped in tick {} by: {}\n", r.cause_tick, name(r.cause));
     if (other)
-      fmt::print("with {}: commanded pose differs by at most {:.3f} {:.3f} {:.3f} mm, {:.4f} {:.4f} "
-                 "{:.4f} deg\n",
-                 other->name, r.pose_difference(0) * 1e3, r.pose_difference(1) * 1e3,
-                 r.pose_difference(2) * 1e3, r.pose_difference(3) / kDegree,
-                 r.pose_difference(4) / kDegree, r.pose_difference(5) / kDegree);
+      fmt::print(
+          "with {}: commanded pose differs by at most {:.3f} {:.3f} {:.3f} mm, {:.4f} {:.4f} "
+          "{:.4f} deg\n",
+          other->name, r.pose_difference(0) * 1e3, r.pose_difference(1) * 1e3,
+          r.pose_difference(2) * 1e3, r.pose_difference(3) / kDegree,
+          r.pose_difference(4) / kDegree, r.pose_difference(5) / kDegree);
     if (!check) return app::kDone;
     fmt::print("{} of {} states and commands differ\n", r.different, r.messages);
     if (r.first)

@@ -5,9 +5,10 @@
 
 int main(int argc, char** argv) {
   using namespace ves;
-  CLI::App cli("Runs a scenario: in real time as two processes on the bus, or with --lockstep as fast "
-               "as possible. Leaves run.lcmlog, summary.json, series.csv and plots.",
-               "ves run");
+  CLI::App cli(
+      "Runs a scenario: in real time as two processes on the bus, or with --lockstep as fast "
+      "as possible. Leaves run.lcmlog, summary.json, series.csv and plots.",
+      "ves run");
   app::RunnerOptions options;
   options.addExperiment(cli);
   options.addBus(cli);

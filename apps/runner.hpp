@@ -51,8 +51,8 @@ inline int runExperiment(RunnerOptions& options) {
       options.private_bus = true;
     }
     if (options.private_bus) enterPrivateBus();
-    LaunchOptions launch{options.process, std::filesystem::read_symlink("/proc/self/exe").parent_path(),
-                         resolved};
+    LaunchOptions launch{options.process,
+                         std::filesystem::read_symlink("/proc/self/exe").parent_path(), resolved};
     launch.process.log = log.string();
     result = runProcesses(
         experiment, launch,

@@ -47,8 +47,7 @@ bool in(const Row& row, int segment) {
 }
 
 TEST_F(ClosedLoop, EveryScenarioParks) {
-  for (const auto& entry :
-       fs::directory_iterator(fs::path(VES_TEST_CONFIG_DIR) / "scenarios")) {
+  for (const auto& entry : fs::directory_iterator(fs::path(VES_TEST_CONFIG_DIR) / "scenarios")) {
     const RunResult result = runLockstep(loadExperiment(entry.path()), nullptr, nullptr);
     EXPECT_EQ(result.phase, Phase::kParked) << entry.path() << " " << name(result.cause);
   }
@@ -65,9 +64,10 @@ TEST_F(ClosedLoop, FreeDecayIsSixClosedFormOscillators) {  // Table 4.1, 4.2.2
     const double t = 0.01 * static_cast<double>(++n);
     for (int i = 0; i < 6; ++i) {
       const double decay = c[i] / m[i] / 2, wd = std::sqrt(k[i] / m[i] - decay * decay);
-      const double x = offset[i] * std::exp(-decay * t) *
-                       (std::cos(wd * t) + decay / wd * std::sin(wd * t));
-      ASSERT_NEAR(row.state.x[i], x, 1e-9 * std::abs(offset[i])) << "coordinate " << i << " t " << t;
+      const double x =
+          offset[i] * std::exp(-decay * t) * (std::cos(wd * t) + decay / wd * std::sin(wd * t));
+      ASSERT_NEAR(row.state.x[i], x, 1e-9 * std::abs(offset[i]))
+          << "coordinate " << i << " t " << t;
     }
   }
   EXPECT_EQ(n, 800);
@@ -78,9 +78,9 @@ TEST_F(ClosedLoop, ZSineErrsAsTheServosGainsAndDelaysSay) {  // 4.2.1
   const auto summary = summarise(series, result_);
   const double extending = summary["z_error_max_extending_m"];
   const double retracting = summary["z_error_max_retracting_m"];
-  // The linear estimate, v/Kv for the peak rate with the loop's second pole, is 35.7 and 53.7 mm. What
-  // the machine adds is delay: half a controller period of hold (5.0 ms), half an update of the
-  // LegSlave (0.5 ms) and the age of its averaged reading (0.17 ms), at 0.628 m/s.
+  // The linear estimate, v/Kv for the peak rate with the loop's second pole, is 35.7 and 53.7 mm.
+  // What the machine adds is delay: half a controller period of hold (5.0 ms), half an update of
+  // the LegSlave (0.5 ms) and the age of its averaged reading (0.17 ms), at 0.628 m/s.
   const double delay = 0.628 * (5.0e-3 + 0.51e-3 + 0.17e-3);  // 3.6 mm
   EXPECT_NEAR(extending, 35.7e-3 + delay, 1.5e-3);
   EXPECT_NEAR(retracting, 53.7e-3 + delay, 1.5e-3);
@@ -115,10 +115,11 @@ TEST_F(ClosedLoop, GravityCompensationLeavesQuantisationAndFilterLag) {
   const Vec3 weight_I(0.0, 0.0, -weight);
   // Quantisation: half an A/D count on each channel twice (reading and calibration), and half a
   // Temposonics count on each leg, which tilts the believed gravity. Worst cases, added up.
-  const double quantisation = e.controller.sensor.C_proc.topRows<3>().cwiseAbs().rowwise().sum().norm() +
-                              weight * 2 * 0.5 * e.plant.transducer.scale / 0.5;  // legs 0.5 m apart
-  // Filter lag: the filter is sqrt(2)/(2 pi 20 Hz) = 11.25 ms late, so it shows the weight as it stood
-  // then, in axes that have turned since: weight * rate * 11.25 ms.
+  const double quantisation =
+      e.controller.sensor.C_proc.topRows<3>().cwiseAbs().rowwise().sum().norm() +
+      weight * 2 * 0.5 * e.plant.transducer.scale / 0.5;  // legs 0.5 m apart
+  // Filter lag: the filter is sqrt(2)/(2 pi 20 Hz) = 11.25 ms late, so it shows the weight as it
+  // stood then, in axes that have turned since: weight * rate * 11.25 ms.
   const double lag = M_SQRT2 / (2 * M_PI * 20.0);
 
   TestPlatform platform(e.controller);
@@ -154,8 +155,10 @@ TEST_F(ClosedLoop, GravityCompensationLeavesQuantisationAndFilterLag) {
       plant.advance(in.tick * 10'000'000 + k * 500'000);
     }
   }
-  std::printf("residual force: still %.3f N (quantisation allows %.3f), tilting %.3f N (filter lag "
-              "%.3f)\n", still, quantisation, moving, allowed);
+  std::printf(
+      "residual force: still %.3f N (quantisation allows %.3f), tilting %.3f N (filter lag "
+      "%.3f)\n",
+      still, quantisation, moving, allowed);
   EXPECT_LT(still, quantisation);
   EXPECT_GT(moving, 0.75 * allowed);
 }
@@ -171,11 +174,12 @@ TEST_F(ClosedLoop, SameSeedSameBytes) {
 }
 
 TEST_F(ClosedLoop, ReachesTheBaseItEmulatesUnderAConstantForce) {
-  // A payload that gravity compensation does not know is a constant force; the base must settle where
-  // its springs hold it: x = F/K. The arm holds still, the difference is 5 kg more in the plant.
-  Experiment e = experiment("puma_on_table_4_1",
-                            {"program=[{move: {}}, {admittance: {duration_s: 25}}]", "sensor.noise=false",
-                             "sensor.bias_v=[0,0,0,0,0,0]"});
+  // A payload that gravity compensation does not know is a constant force; the base must settle
+  // where its springs hold it: x = F/K. The arm holds still, the difference is 5 kg more in the
+  // plant.
+  Experiment e =
+      experiment("puma_on_table_4_1", {"program=[{move: {}}, {admittance: {duration_s: 25}}]",
+                                       "sensor.noise=false", "sensor.bias_v=[0,0,0,0,0,0]"});
   RigidBody stone;
   stone.mass = 5.0;
   e.plant.payload.adapter_R = combine(e.plant.payload.adapter_R, {}, stone);
@@ -203,7 +207,8 @@ TEST_F(ClosedLoop, RatesFrom75HertzOnStayTrueToTheModel) {
       if (!in(row, 3)) continue;
       const double t = T * static_cast<double>(++n), wd = std::sqrt(3.0 - 0.25);
       ASSERT_NEAR(row.state.x[0],
-                  0.10 * std::exp(-0.5 * t) * (std::cos(wd * t) + 0.5 / wd * std::sin(wd * t)), 1e-10);
+                  0.10 * std::exp(-0.5 * t) * (std::cos(wd * t) + 0.5 / wd * std::sin(wd * t)),
+                  1e-10);
     }
     EXPECT_GT(n, 500);
   }
@@ -211,8 +216,9 @@ TEST_F(ClosedLoop, RatesFrom75HertzOnStayTrueToTheModel) {
 
 TEST_F(ClosedLoop, SwitchStopsTheRunAndLeavesItsName) {
   const Series series = run(experiment(
-      "z_sine", {"program=[{move: {}}, {trajectory: {duration_s: 3, z: {sine: {amplitude_m: 0.1, "
-                 "frequency_hz: 0.5}}}, switches: [{at_s: 1.0, duration_s: 0.2, switch: floor_mat}]}]"}));
+      "z_sine",
+      {"program=[{move: {}}, {trajectory: {duration_s: 3, z: {sine: {amplitude_m: 0.1, "
+       "frequency_hz: 0.5}}}, switches: [{at_s: 1.0, duration_s: 0.2, switch: floor_mat}]}]"}));
   EXPECT_FALSE(result_.good());
   EXPECT_EQ(result_.cause, Check::kFloorMat);
   const auto summary = summarise(series, result_);
@@ -227,9 +233,9 @@ TEST_F(ClosedLoop, SwitchStopsTheRunAndLeavesItsName) {
 
 TEST_F(ClosedLoop, StopRequestEndsParked) {
   int ticks = 0;
-  const RunResult result = runLockstep(experiment("puma_on_table_4_1"), nullptr, [&](const TickState&) {
-    return ++ticks == 900 ? Request::kStop : Request::kNone;
-  });
+  const RunResult result = runLockstep(
+      experiment("puma_on_table_4_1"), nullptr,
+      [&](const TickState&) { return ++ticks == 900 ? Request::kStop : Request::kNone; });
   EXPECT_TRUE(result.good());
   EXPECT_LT(result.ticks, 1300);
 }

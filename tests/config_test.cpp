@@ -50,11 +50,25 @@ TEST(Config, ResolvedTextReadsBackToTheSameExperiment) {
 
 TEST(Config, EveryMachineNumberIsTheReportsOrTagged) {
   // Keys whose untagged numbers are in the report, or are a choice of the experiment.
-  const std::set<std::string> report = {
-      "schema", "seed", "gravity_m_per_s2", "period_ns", "K_P", "K_D", "gain_extend_in_per_s_per_ma",
-      "gain_retract_in_per_s_per_ma", "tau_s", "counts_per_in", "filters", "filter_cutoff_rad_per_s",
-      "cutoff_hz", "noise", "translation_m", "rotation_deg", "mass_diagonal", "damping_diagonal",
-      "stiffness_diagonal"};
+  const std::set<std::string> report = {"schema",
+                                        "seed",
+                                        "gravity_m_per_s2",
+                                        "period_ns",
+                                        "K_P",
+                                        "K_D",
+                                        "gain_extend_in_per_s_per_ma",
+                                        "gain_retract_in_per_s_per_ma",
+                                        "tau_s",
+                                        "counts_per_in",
+                                        "filters",
+                                        "filter_cutoff_rad_per_s",
+                                        "cutoff_hz",
+                                        "noise",
+                                        "translation_m",
+                                        "rotation_deg",
+                                        "mass_diagonal",
+                                        "damping_diagonal",
+                                        "stiffness_diagonal"};
   const std::function<void(const Value&, const std::string&, bool)> check =
       [&](const Value& value, const std::string& key, bool tagged) {
         tagged = tagged || !value.tag.empty();
@@ -112,22 +126,26 @@ INSTANTIATE_TEST_SUITE_P(
             "base.stiffness_diagonal: smallest eigenvalue -1, want none below 0"},
         Bad{"negative_damping", "z_sine", "base.damping_diagonal=[0, 0, 0, 0, 0, -5]",
             "positive semidefinite"},
-        Bad{"choice", "z_sine", "legs.filters=all", "legs.filters: 'all', want one of none, outputs"},
+        Bad{"choice", "z_sine", "legs.filters=all",
+            "legs.filters: 'all', want one of none, outputs"},
         Bad{"flag", "z_sine", "sensor.noise=yes", "sensor.noise: 'yes', want one of true, false"},
         Bad{"stroke_outside_transducer", "z_sine", "legs.offset_m=1.3", "14-bit transducer"},
-        Bad{"initial_pose_out_of_reach", "z_sine", "initial_pose.z_m=0.9", "initial_pose: takes legs"},
+        Bad{"initial_pose_out_of_reach", "z_sine", "initial_pose.z_m=0.9",
+            "initial_pose: takes legs"},
         Bad{"joint_outside_limits", "puma_tilt", "robot.joints_deg_or_m=[0, 90, 0, 0, 0, 0]",
             "joint 'joint_2' at 90, want [-225, 45] deg"},
         Bad{"joint_count", "puma_tilt", "robot.joints_deg_or_m=[0]", "has 1 entries, want 6"},
         Bad{"no_such_section", "z_sine", "robots.urdf_text=x", "robots: unknown key"},
         Bad{"empty_program", "z_sine", "program=[]", "program: has 0 segments"},
         Bad{"unknown_segment", "z_sine", "program=[{dance: {}}]", "program[0].dance: unknown"},
-        Bad{"two_kinds", "z_sine", "program=[{move: {}, calibration: {}}]", "want only one of them"},
+        Bad{"two_kinds", "z_sine", "program=[{move: {}, calibration: {}}]",
+            "want only one of them"},
         Bad{"sine_without_frequency", "z_sine",
             "program=[{trajectory: {duration_s: 1, x: {sine: {amplitude_m: 0.1}}}}]",
             "program[0].trajectory.x.sine.frequency_hz: missing"},
         Bad{"angle_in_metres", "z_sine",
-            "program=[{trajectory: {duration_s: 1, alpha: {ramp: {to_m: 0.1}}}}]", "to_deg: missing"},
+            "program=[{trajectory: {duration_s: 1, alpha: {ramp: {to_m: 0.1}}}}]",
+            "to_deg: missing"},
         Bad{"robot_event_without_robot", "z_sine",
             "program=[{move: {}, robot: [{at_s: 0, duration_s: 1, joint: a, to_deg_or_m: 1}]}]",
             "there is no robot"},
@@ -164,7 +182,8 @@ TEST_F(BadFile, NamesFileAndLine) {
   EXPECT_EQ(load(base + "name: a\ndescription: b\nprogram:\n  - move: {}\nlegs:\n  tau_s: 7\n"),
             (folder_ / "a.yaml").string() + ":7: legs.tau_s: '7', want a number in [1e-06, 1]");
   EXPECT_EQ(load(base + "name: a\ndescription: b\nprogram:\n  - move: {}\nsede: 3\n")
-                .rfind((folder_ / "a.yaml").string() + ":6: sede: unknown key", 0), 0u);
+                .rfind((folder_ / "a.yaml").string() + ":6: sede: unknown key", 0),
+            0u);
 }
 
 TEST_F(BadFile, AsymmetryNamesTheEntries) {
@@ -182,7 +201,8 @@ TEST_F(BadFile, AsymmetryNamesTheEntries) {
                            "  stiffness_diagonal: [0, 0, 0, 0, 0, 0]\n"
                            "initial_pose: {}\nname: a\ndescription: b\nprogram: [{move: {}}]\n";
   EXPECT_NE(load(text).find("base.mass: not symmetric: entry [1][0] is 0, [0][1] is 1"),
-            std::string::npos) << load(text);
+            std::string::npos)
+      << load(text);
 }
 
 TEST_F(BadFile, SaysWhatIsNotYaml) {
@@ -219,7 +239,8 @@ std::string link(const std::string& name, const std::string& inertia = "0.1") {
 std::string joint(const std::string& name, const std::string& parent, const std::string& child,
                   const std::string& type = "revolute") {
   return "<joint name=\"" + name + "\" type=\"" + type + "\">\n<parent link=\"" + parent +
-         "\"/><child link=\"" + child + "\"/><axis xyz=\"0 0 1\"/>"
+         "\"/><child link=\"" + child +
+         "\"/><axis xyz=\"0 0 1\"/>"
          "<limit lower=\"-1\" upper=\"1\" effort=\"1\" velocity=\"1\"/></joint>\n";
 }
 std::string urdf(const std::string& body) {
@@ -258,11 +279,14 @@ TEST(Urdf, RefusesWithFileLineAndName) {
   EXPECT_NE(urdfRefusal(urdf(link("a") + link("b") + joint("j1", "a", "gone"))).find("gone"),
             std::string::npos);
   EXPECT_NE(urdfRefusal(urdf(link("a") + link("b") + joint("j1", "a", "b") + joint("j2", "b", "a")))
-                .find("r.urdf:"), std::string::npos);  // cyclic
+                .find("r.urdf:"),
+            std::string::npos);  // cyclic
   EXPECT_NE(urdfRefusal(urdf(link("a") + link("b") + joint("j1", "a", "b", "planar")))
-                .find("not supported"), std::string::npos);
+                .find("not supported"),
+            std::string::npos);
   EXPECT_NE(urdfRefusal(urdf(link("a") + link("b", "-0.1") + joint("j1", "a", "b")))
-                .find("principal moment"), std::string::npos);
+                .find("principal moment"),
+            std::string::npos);
   EXPECT_NE(urdfRefusal(urdf(link("a") + link("b", "nan") + joint("j1", "a", "b"))), "");
   EXPECT_NE(urdfRefusal("not xml").find("r.urdf:1"), std::string::npos);
   EXPECT_NE(urdfRefusal(""), "");

@@ -47,7 +47,8 @@ TEST(ForceMeasurement, UndoesSensorAndFrames) {  // (2.6) forward, (C.1) back
     const Vec6 bias = Vec6::Constant(37.0);
     const Vec6 counts = S_proc * W_S + bias;
     AdcCounts adc{};
-    for (int i = 0; i < 6; ++i) adc[static_cast<std::size_t>(i)] = static_cast<int>(std::lround(counts(i)));
+    for (int i = 0; i < 6; ++i)
+      adc[static_cast<std::size_t>(i)] = static_cast<int>(std::lround(counts(i)));
     const Wrench out = forceMeasurement(e.controller.sensor, bias, adc, R_IP);
     // Half a count in each channel is 0.023 N (x, y), 0.09 N (z), 0.009 N m at gain 1000.
     ASSERT_LT((out.f - F_Po_I.f).norm(), 0.11);
@@ -106,19 +107,23 @@ TEST(GravityCompensation, EqualsNewtonEulerAtRest) {
 TEST(GravityCompensation, IsTheHandSumAtHome) {  // m g, and r x m g of each plate and link
   const Experiment e = experiment("puma_tilt");
   JointVector zero = JointVector::Zero();
-  const Wrench F_Po = gravityCompensation(e.controller.payload, zero, Mat3::Identity(), {0, 0, -9.81});
+  const Wrench F_Po =
+      gravityCompensation(e.controller.payload, zero, Mat3::Identity(), {0, 0, -9.81});
   EXPECT_NEAR(F_Po.f.z(), -9.81 * (52.45 + 16.0 + 5.0), 1e-9);
   EXPECT_NEAR(F_Po.f.head<2>().norm(), 0.0, 1e-9);
-  // AKB pose of zeros: moment of links 1 to 6 about frame 0 is (60.31978, -36.98581), of the support on
-  // the robot; link 0 adds 20 kg at y = -0.015. The plates are centred.
+  // AKB pose of zeros: moment of links 1 to 6 about frame 0 is (60.31978, -36.98581), of the
+  // support on the robot; link 0 adds 20 kg at y = -0.015. The plates are centred.
   EXPECT_NEAR(F_Po.n.x(), -60.31978 + 20.0 * 9.81 * 0.015, 1e-4);
   EXPECT_NEAR(F_Po.n.y(), 36.98581, 1e-4);
 }
 
 TEST(GravityCompensation, VanishesInSpace) {
   const Experiment e = experiment("puma_tilt");
-  EXPECT_EQ(gravityCompensation(e.controller.payload, e.plant.initial_joints, rotation({0.3, 0.2, 0.1}),
-                                Vec3::Zero()).stacked().norm(), 0.0);
+  EXPECT_EQ(gravityCompensation(e.controller.payload, e.plant.initial_joints,
+                                rotation({0.3, 0.2, 0.1}), Vec3::Zero())
+                .stacked()
+                .norm(),
+            0.0);
 }
 
 // --- Admittance model ---------------------------------------------------------------------------
@@ -241,7 +246,7 @@ TEST(TrajectoryGeneration, RampsAndSinesAreTheReportsEquations) {
   const std::int64_t N = 250;
   Vec6 x = initial;
   for (std::int64_t n = 1; n <= N; ++n) {
-    x(0) += (0.2 - 0.05) / 250;                                          // (C.8), (C.9) accumulated
+    x(0) += (0.2 - 0.05) / 250;  // (C.8), (C.9) accumulated
     x(2) = -0.02 + 0.1 * std::sin(2 * M_PI * 0.5 * 0.01 * static_cast<double>(n));  // (C.10)
     const PathPoint<6> p = trajectoryGeneration(trajectory, initial, n, N, kT);
     ASSERT_LT((p.x - x).norm(), 1e-13);
@@ -290,8 +295,10 @@ class SafetyChecks : public testing::Test {
 TEST_F(SafetyChecks, Velocity) {
   for (int i = 0; i < 6; ++i) {
     for (double sign : {-1.0, 1.0}) {
-      EXPECT_TRUE(velocityCheck(l_, L_ + sign * 0.999 * l_.leg_velocity * kT * Vec6::Unit(i), L_, kT));
-      EXPECT_FALSE(velocityCheck(l_, L_ + sign * 1.001 * l_.leg_velocity * kT * Vec6::Unit(i), L_, kT));
+      EXPECT_TRUE(
+          velocityCheck(l_, L_ + sign * 0.999 * l_.leg_velocity * kT * Vec6::Unit(i), L_, kT));
+      EXPECT_FALSE(
+          velocityCheck(l_, L_ + sign * 1.001 * l_.leg_velocity * kT * Vec6::Unit(i), L_, kT));
     }
     EXPECT_FALSE(velocityCheck(l_, L_ + kNan * Vec6::Unit(i), L_, kT));
   }
@@ -422,11 +429,10 @@ TEST(TrippedSet, FirstIsTheHighestPriority) {
 /// A controller on a machine that goes exactly where it is told, at once.
 class Bench {
  public:
-  explicit Bench(const std::string& scenario)
-      : e_(experiment(scenario)), platform_(e_.controller) {
+  explicit Bench(const std::string& scenario) : e_(experiment(scenario)), platform_(e_.controller) {
     const Geometry& g = e_.controller.geometry;
-    in_.sample.legs =
-        legCounts(e_.controller.legs, legLengths(g, g.fromHome({{0.01, -0.02, -0.05}, {0.02, 0.0, 0.01}})));
+    in_.sample.legs = legCounts(
+        e_.controller.legs, legLengths(g, g.fromHome({{0.01, -0.02, -0.05}, {0.02, 0.0, 0.01}})));
     in_.sample.q = e_.plant.initial_joints;
     in_.sample.switches = kAllSwitchesClosed;
     in_.request = Request::kStart;
@@ -460,7 +466,8 @@ TEST(TestPlatform, FirstCommandIsTheMeasuredPose) {
     const TickState& state = bench.tick();
     if (!state.command.engaged) continue;
     EXPECT_EQ(state.phase, Phase::kArmed);
-    for (std::size_t k = 0; k < kLegs; ++k) EXPECT_LE(std::abs(state.command.counts[k] - found[k]), 1);
+    for (std::size_t k = 0; k < kLegs; ++k)
+      EXPECT_LE(std::abs(state.command.counts[k] - found[k]), 1);
     return;
   }
   FAIL() << "never armed";

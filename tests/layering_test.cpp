@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Holds the module diagram of the README: who may include whom, and what the control path is free of.
+// Holds the module diagram of the README: who may include whom, and what the control path is free
+// of.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -27,7 +28,8 @@ const std::map<std::string, Names> kMayInclude = {
     {"realtime", {"config"}},
     {"transport", {"math", "kinematics", "robot", "control", "plant", "config"}},
     {"run", {"math", "kinematics", "robot", "control", "plant", "config", "transport", "realtime"}},
-    {"replay", {"math", "kinematics", "robot", "control", "plant", "config", "transport", "realtime"}},
+    {"replay",
+     {"math", "kinematics", "robot", "control", "plant", "config", "transport", "realtime"}},
     {"report",
      {"math", "kinematics", "robot", "control", "plant", "config", "transport", "realtime", "run"}},
 };
@@ -72,8 +74,16 @@ TEST(Layering, NothingPointsUp) {
 }
 
 TEST(Layering, ControlPathKnowsEigenAndTheLanguageOnly) {
-  const Names allowed = {"algorithm", "array", "cassert", "cmath", "cstdint", "string_view",
-                         "Eigen/Core", "Eigen/Geometry", "Eigen/LU", "Eigen/QR",
+  const Names allowed = {"algorithm",
+                         "array",
+                         "cassert",
+                         "cmath",
+                         "cstdint",
+                         "string_view",
+                         "Eigen/Core",
+                         "Eigen/Geometry",
+                         "Eigen/LU",
+                         "Eigen/QR",
                          "unsupported/Eigen/MatrixFunctions"};
   for (const Include& i : includes())
     if (kPure.count(i.module) && i.name.rfind("ves/", 0) != 0) {
@@ -98,7 +108,8 @@ TEST(Layering, LinkGraphIsTheSameDiagram) {
 }
 
 TEST(Layering, ControlPathNeitherThrowsNorAllocatesNorPrints) {
-  const std::regex banned(R"(\b(throw|new|malloc|std::vector|std::string|printf|std::cout|std::function|std::mutex|std::chrono)\b)");
+  const std::regex banned(
+      R"(\b(throw|new|malloc|std::vector|std::string|printf|std::cout|std::function|std::mutex|std::chrono)\b)");
   for (const fs::path& top : {kRoot / "include/ves", kRoot / "src"})
     for (const std::string& module : kPure)
       for (const auto& entry : fs::directory_iterator(top / module)) {
@@ -107,7 +118,8 @@ TEST(Layering, ControlPathNeitherThrowsNorAllocatesNorPrints) {
         for (int n = 1; std::getline(in, text); ++n) {
           const std::string code = text.substr(0, text.find("//"));
           std::smatch match;
-          if (std::regex_search(code, match, banned) && code.find("std::string_view") == std::string::npos)
+          if (std::regex_search(code, match, banned) &&
+              code.find("std::string_view") == std::string::npos)
             ADD_FAILURE() << entry.path() << ":" << n << ": " << match[1];
         }
       }

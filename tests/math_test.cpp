@@ -33,8 +33,8 @@ TEST(AngleRates, MatchTheDerivativeOfTheRotation) {
   const double h = 1e-5;
   for (double t = 0.0; t < 3.0; t += 0.1) {
     const Mat3 R = rotation(swing.x(t).tail<3>());
-    const Mat3 R_dot = (rotation(swing.x(t + h).tail<3>()) - rotation(swing.x(t - h).tail<3>())) /
-                       (2.0 * h);
+    const Mat3 R_dot =
+        (rotation(swing.x(t + h).tail<3>()) - rotation(swing.x(t - h).tail<3>())) / (2.0 * h);
     const Mat3 W = R_dot * R.transpose();  // skew(w_IP_I)
     const Vec3 w = angleRateMap(swing.x(t).tail<3>()) * swing.xDot(t).tail<3>();
     ASSERT_LT((Vec3(W(2, 1), W(0, 2), W(1, 0)) - w).norm(), 1e-8);
@@ -45,8 +45,9 @@ TEST(AngleRates, MapDerivativeMatchesFiniteDifferences) {
   const test::Swing swing(4);
   const double h = 1e-5;
   for (double t = 0.0; t < 3.0; t += 0.1) {
-    const Mat3 oracle = (angleRateMap(swing.x(t + h).tail<3>()) -
-                         angleRateMap(swing.x(t - h).tail<3>())) / (2.0 * h);
+    const Mat3 oracle =
+        (angleRateMap(swing.x(t + h).tail<3>()) - angleRateMap(swing.x(t - h).tail<3>())) /
+        (2.0 * h);
     const Mat3 E_dot = angleRateMapDerivative(swing.x(t).tail<3>(), swing.xDot(t).tail<3>());
     ASSERT_LT((oracle - E_dot).norm(), 1e-8);
   }
@@ -59,7 +60,8 @@ TEST(Wrench, ShiftAndTransferKeepPower) {
     const Vec3 v_A(0.4, -0.3, 0.2), w_A(-0.1, 0.5, 0.7);  // twist of Ao, one rigid body
     const Vec3 v_B = X_AB.R.transpose() * (v_A + w_A.cross(X_AB.p)), w_B = X_AB.R.transpose() * w_A;
     const Wrench F_Ao_A = transfer(X_AB, F_Bo_B);
-    ASSERT_NEAR(F_Ao_A.f.dot(v_A) + F_Ao_A.n.dot(w_A), F_Bo_B.f.dot(v_B) + F_Bo_B.n.dot(w_B), 1e-12);
+    ASSERT_NEAR(F_Ao_A.f.dot(v_A) + F_Ao_A.n.dot(w_A), F_Bo_B.f.dot(v_B) + F_Bo_B.n.dot(w_B),
+                1e-12);
   }
 }
 
@@ -100,15 +102,18 @@ INSTANTIATE_TEST_SUITE_P(
                     Mode{"step_of_one", 1.0, 0.1, 1.0}, Mode{"edge_series", 1.0001, 1.9, 1.0}),
     [](const auto& test) { return test.param.name; });
 
-/// State space of a Butterworth filter, driven by a straight line: exp on the state beside the line.
+/// State space of a Butterworth filter, driven by a straight line: exp on the state beside the
+/// line.
 template <int Order>
 double exactRamp(double w, double y_rest, double u0, double u1, double dt) {
   // Companion form of the denominator; states are y and its derivatives.
   using Wide = long double;
   Eigen::Matrix<Wide, Order + 2, Order + 2> M = Eigen::Matrix<Wide, Order + 2, Order + 2>::Zero();
-  const double coefficients2[] = {w * w, M_SQRT2 * w}, coefficients3[] = {w * w * w, 2 * w * w, 2 * w};
+  const double coefficients2[] = {w * w, M_SQRT2 * w},
+               coefficients3[] = {w * w * w, 2 * w * w, 2 * w};
   for (int i = 0; i + 1 < Order; ++i) M(i, i + 1) = 1.0;
-  for (int i = 0; i < Order; ++i) M(Order - 1, i) = -(Order == 2 ? coefficients2 : coefficients3)[i];
+  for (int i = 0; i < Order; ++i)
+    M(Order - 1, i) = -(Order == 2 ? coefficients2 : coefficients3)[i];
   M(Order - 1, Order) = std::pow(w, Order);  // input u
   M(Order, Order + 1) = 1.0;                 // u' = slope
   Eigen::Matrix<Wide, Order + 2, 1> state = Eigen::Matrix<Wide, Order + 2, 1>::Zero();

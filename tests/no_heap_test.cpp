@@ -22,9 +22,10 @@ TEST(MallocGuard, CountsAnAllocation) {  // the test that the others can fail
 class NoHeap : public testing::TestWithParam<const char*> {};
 
 TEST_P(NoHeap, FromArmingToParking) {
-  for (const char* base : {"seed=1",
-                           "base={mass_diagonal: [500,500,500,250,250,250], damping_diagonal: "
-                           "[500,400,300,200,100,90], stiffness_diagonal: [1500,2500,4000,1500,1000,2000]}"}) {
+  for (const char* base :
+       {"seed=1",
+        "base={mass_diagonal: [500,500,500,250,250,250], damping_diagonal: "
+        "[500,400,300,200,100,90], stiffness_diagonal: [1500,2500,4000,1500,1000,2000]}"}) {
     const Experiment e = experiment(GetParam(), {base});
     TestPlatform platform(e.controller);
     plant::Plant plant(e.plant);

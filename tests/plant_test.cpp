@@ -174,8 +174,8 @@ TEST(Sensor, SettledReadingIsSprocTimesWrench) {  // (2.6)
   ForceTorqueSensor sensor(e.plant.sensor, Noise(1));
   const Wrench W{Vec3(100.0, -50.0, 300.0), Vec3(20.0, 10.0, -5.0)};
   sensor.settle(W);
-  const Vec6 expected = e.plant.sensor.S_proc() * W.stacked() +
-                        e.plant.sensor.bias / e.plant.sensor.volts_per_count;
+  const Vec6 expected =
+      e.plant.sensor.S_proc() * W.stacked() + e.plant.sensor.bias / e.plant.sensor.volts_per_count;
   const AdcCounts adc = sensor.convert();
   for (int i = 0; i < 6; ++i) EXPECT_NEAR(adc[static_cast<std::size_t>(i)], expected(i), 0.5);
 }
@@ -189,8 +189,8 @@ TEST(Sensor, ConverterSaturates) {
 }
 
 TEST(Sensor, NoiseIsAsFigure41) {
-  // 1 s at 100 Hz, unloaded: X and Y under about 1 N, Z up to about 3 N, moments under 1 N m. One sigma
-  // is 7 mV at gain 4000, so with gain 1000 each channel must show 1.75 mV rms.
+  // 1 s at 100 Hz, unloaded: X and Y under about 1 N, Z up to about 3 N, moments under 1 N m. One
+  // sigma is 7 mV at gain 4000, so with gain 1000 each channel must show 1.75 mV rms.
   Experiment e = experiment("z_sine");
   const Mat6 C_proc = e.controller.sensor.C_proc;
   ForceTorqueSensor sensor(e.plant.sensor, Noise(3));
@@ -218,7 +218,8 @@ TEST(Sensor, NoiseIsAsFigure41) {
   EXPECT_LT(largest.tail<3>().maxCoeff(), 1.0);
 }
 
-// --- The whole ------------------------------------------------------------------------------------
+// --- The whole
+// ------------------------------------------------------------------------------------
 
 TEST(Plant, RestsWhereItIs) {
   const Experiment e = experiment("puma_tilt");
@@ -235,7 +236,8 @@ TEST(Plant, FirstSampleShowsTheInitialPose) {
   Experiment e = experiment("puma_on_table_4_1");
   Plant plant(e.plant);
   const Sample s = plant.sample();
-  const Vec6 L = legLengths(e.controller.geometry, e.controller.geometry.fromHome(e.plant.initial_pose));
+  const Vec6 L =
+      legLengths(e.controller.geometry, e.controller.geometry.fromHome(e.plant.initial_pose));
   EXPECT_LE((legLengths(e.controller.legs, s.legs) - L).cwiseAbs().maxCoeff(),
             0.5 * e.plant.transducer.scale * (1 + 1e-9));
 }
@@ -258,9 +260,9 @@ TEST(Plant, IgnoresCommandsThatAreNotEngaged) {
 }
 
 TEST(Plant, SensorFeelsTheLegsMoveTheRobot) {
-  // Momentum balance of the whole payload while the platform swings: the wrench on the platform is minus
-  // the rate of momentum, less gravity. Checked through the true wrench against Newton-Euler by parts,
-  // with the plates on their own.
+  // Momentum balance of the whole payload while the platform swings: the wrench on the platform is
+  // minus the rate of momentum, less gravity. Checked through the true wrench against Newton-Euler
+  // by parts, with the plates on their own.
   Experiment e = experiment("puma_on_table_4_1");
   Plant plant(e.plant);
   LegCommand command;
@@ -268,7 +270,8 @@ TEST(Plant, SensorFeelsTheLegsMoveTheRobot) {
   for (int k = 0; k < 100; ++k) {
     const Geometry& g = e.controller.geometry;
     const double s = 0.03 * std::sin(0.1 * k);
-    command.counts = legCounts(e.controller.legs, legLengths(g, g.fromHome({{s, 0.0, s}, {s, -s, 0.0}})));
+    command.counts =
+        legCounts(e.controller.legs, legLengths(g, g.fromHome({{s, 0.0, s}, {s, -s, 0.0}})));
     plant.command(command);
     plant.advance((k + 1) * 10'000'000LL);
     plant.sample();
@@ -279,9 +282,12 @@ TEST(Plant, SensorFeelsTheLegsMoveTheRobot) {
     };
     const Wrench oracle =
         part(load.X_PL0(), newtonEuler(load.robot, truth.joints,
-                                       feltMotion(truth.P, load.X_PL0(), e.plant.gravity)).F_L0o_L0) +
-        part(load.X_PR, inertialWrench(load.adapter_R, feltMotion(truth.P, load.X_PR, e.plant.gravity))) +
-        part(load.X_PS, inertialWrench(load.top_plate_S, feltMotion(truth.P, load.X_PS, e.plant.gravity)));
+                                       feltMotion(truth.P, load.X_PL0(), e.plant.gravity))
+                               .F_L0o_L0) +
+        part(load.X_PR,
+             inertialWrench(load.adapter_R, feltMotion(truth.P, load.X_PR, e.plant.gravity))) +
+        part(load.X_PS,
+             inertialWrench(load.top_plate_S, feltMotion(truth.P, load.X_PS, e.plant.gravity)));
     ASSERT_LT((truth.F_Po_I - oracle).stacked().norm(), 1e-9);
   }
 }

@@ -29,7 +29,8 @@ Output sh(const std::string& command) {
   Output out{-1, ""};
   std::FILE* pipe = popen(("( " + command + " ) 2>&1 </dev/null").c_str(), "r");
   std::array<char, 4096> buffer;
-  while (std::size_t n = fread(buffer.data(), 1, buffer.size(), pipe)) out.text.append(buffer.data(), n);
+  while (std::size_t n = fread(buffer.data(), 1, buffer.size(), pipe))
+    out.text.append(buffer.data(), n);
   const int status = pclose(pipe);
   out.status = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   return out;
@@ -39,9 +40,9 @@ class Programs : public testing::Test {
  protected:
   void SetUp() override {
     setenv("VES_CONFIG_DIR", VES_TEST_CONFIG_DIR, 1);
-    folder_ = fs::temp_directory_path() /
-              ("ves_programs_" + std::to_string(getpid()) +
-               testing::UnitTest::GetInstance()->current_test_info()->name());
+    folder_ =
+        fs::temp_directory_path() / ("ves_programs_" + std::to_string(getpid()) +
+                                     testing::UnitTest::GetInstance()->current_test_info()->name());
     fs::create_directories(folder_);
   }
   void TearDown() override { fs::remove_all(folder_); }
@@ -112,8 +113,8 @@ TEST_F(Programs, LockstepRunLeavesItsFiles) {
   const Output o = run("z_sine --lockstep --seed 3" + out("a"));
   EXPECT_EQ(o.status, 0) << o.text;
   EXPECT_NE(o.text.find("z error"), std::string::npos) << o.text;
-  for (const char* file : {"run.lcmlog", "series.csv", "summary.json", "experiment.yaml", "pose.png",
-                           "error.png", "legs.png"})
+  for (const char* file : {"run.lcmlog", "series.csv", "summary.json", "experiment.yaml",
+                           "pose.png", "error.png", "legs.png"})
     EXPECT_TRUE(fs::exists(folder_ / "a" / file)) << file;
   const auto s = summary(folder_ / "a");
   EXPECT_EQ(s["seed"], 3);
@@ -122,12 +123,15 @@ TEST_F(Programs, LockstepRunLeavesItsFiles) {
   EXPECT_TRUE(s["real_time_factor"].is_number());
   EXPECT_EQ(s["configuration_hash"].get<std::string>().size(), 16u);
   // The resolved experiment is a scenario like any other.
-  EXPECT_EQ(run((folder_ / "a/experiment.yaml").string() + " --lockstep --no-plots" + out("b")).status, 0);
+  EXPECT_EQ(
+      run((folder_ / "a/experiment.yaml").string() + " --lockstep --no-plots" + out("b")).status,
+      0);
   EXPECT_EQ(commands(folder_ / "a"), commands(folder_ / "b"));
 }
 
 TEST_F(Programs, TrippedRunEndsWithOne) {
-  const Output o = run("z_sine --lockstep --no-plots --set safety.position_error_m=0.03" + out("a"));
+  const Output o =
+      run("z_sine --lockstep --no-plots --set safety.position_error_m=0.03" + out("a"));
   EXPECT_EQ(o.status, 1) << o.text;
   EXPECT_NE(o.text.find("by: position error"), std::string::npos) << o.text;
   EXPECT_EQ(summary(folder_ / "a")["first_cause"], "position error");
@@ -169,9 +173,11 @@ TEST_F(Programs, TwoProcessesInLockstepCommandWhatOneDoes) {
 }
 
 TEST_F(Programs, RealTimeRunOfTwoProcesses) {
-  const Output o = run("z_sine --private-bus --no-plots --set "
-                       "'program=[{calibration: {}},{trajectory: {duration_s: 1, z: {sine: "
-                       "{amplitude_m: 0.05, frequency_hz: 1}}}}]'" + out("a"));
+  const Output o =
+      run("z_sine --private-bus --no-plots --set "
+          "'program=[{calibration: {}},{trajectory: {duration_s: 1, z: {sine: "
+          "{amplitude_m: 0.05, frequency_hz: 1}}}}]'" +
+          out("a"));
   EXPECT_EQ(o.status, 0) << o.text;
   const auto s = summary(folder_ / "a");
   EXPECT_EQ(s["ended"], "parked");
@@ -212,8 +218,9 @@ TEST_F(Programs, LcmLoggerBesideARunReplaysToo) {
   Child plant({dir + "plant", "z_sine"});
   while (sequence < 10 && bus.wait(5000)) {
   }
-  Child controller({dir + "controller", "z_sine", "--set",
-                    "program=[{trajectory: {duration_s: 1, z: {sine: {amplitude_m: 0.05, frequency_hz: 1}}}}]"});
+  Child controller(
+      {dir + "controller", "z_sine", "--set",
+       "program=[{trajectory: {duration_s: 1, z: {sine: {amplitude_m: 0.05, frequency_hz: 1}}}}]"});
   EXPECT_EQ(controller.wait(), 0);
   plant.signal(SIGTERM);
   EXPECT_EQ(plant.wait(), 0);
@@ -230,13 +237,14 @@ TEST_F(Programs, SecondControllerRefusesToArmAndTheFirstGoesOn) {
   std::set<std::int64_t> commanders;
   Phase phase = Phase::kDisarmed;
   std::int64_t first_source = 0;
-  bus.subscribe(channel::kLegCommand, [&](const std::string&, const void* data, std::uint32_t size) {
-    const auto m = decode<leg_command_t>(data, size);
-    if (!m || !m->engaged) return;
-    ++engaged;
-    commanders.insert(m->header.source);
-    if (first_source == 0) first_source = m->header.source;
-  });
+  bus.subscribe(channel::kLegCommand,
+                [&](const std::string&, const void* data, std::uint32_t size) {
+                  const auto m = decode<leg_command_t>(data, size);
+                  if (!m || !m->engaged) return;
+                  ++engaged;
+                  commanders.insert(m->header.source);
+                  if (first_source == 0) first_source = m->header.source;
+                });
   bus.subscribe(channel::kState, [&](const std::string&, const void* data, std::uint32_t size) {
     const auto m = decode<state_t>(data, size);
     if (m && m->header.source == first_source) phase = static_cast<Phase>(m->phase);

@@ -113,8 +113,8 @@ TEST_F(Replay, SaysWhatALogLacks) {
 
 TEST_F(Replay, AnotherConfigurationShowsWhatItWouldHaveDone) {
   // A base twice as stiff in x, under the same measured wrenches.
-  const Experiment other =
-      experiment("puma_on_table_4_1", {"base.stiffness_diagonal=[3000, 2500, 4000, 1500, 1000, 2000]"});
+  const Experiment other = experiment(
+      "puma_on_table_4_1", {"base.stiffness_diagonal=[3000, 2500, 4000, 1500, 1000, 2000]"});
   ReplayOptions options;
   options.with = &other;
   const ReplayResult r = replay(log_, options, nullptr);

@@ -55,8 +55,8 @@ Vec6 momentum(const RobotModel& robot, const test::Swing& base, const Transform&
     const auto com = [&](double s) { return Vec3(poseOf(body, s) * b.p_BoBcm_B); };
     const auto R = [&](double s) { return poseOf(body, s).R; };
     const Vec3 v = (com(t - 2 * h) - 8 * com(t - h) + 8 * com(t + h) - com(t + 2 * h)) / (12 * h);
-    const Mat3 W = (R(t - 2 * h) - 8 * R(t - h) + 8 * R(t + h) - R(t + 2 * h)) / (12 * h) *
-                   R(t).transpose();
+    const Mat3 W =
+        (R(t - 2 * h) - 8 * R(t - h) + 8 * R(t + h) - R(t + 2 * h)) / (12 * h) * R(t).transpose();
     const Vec3 w(0.5 * (W(2, 1) - W(1, 2)), 0.5 * (W(0, 2) - W(2, 0)), 0.5 * (W(1, 0) - W(0, 1)));
     const Mat3 I_I = R(t) * b.I_Bcm_B * R(t).transpose();
     sum.head<3>() += b.mass * v;
@@ -86,7 +86,8 @@ TEST_P(MovingBase, WrenchIsTheRateOfMomentum) {  // Appendix A with link 0 and a
 
       const BodyMotion P = base.motion(t);
       const Wrench F_L0o_L0 =
-          newtonEuler(robot, jointSwing(robot.joints, t), feltMotion(P, X_PL0, Vec3::Zero())).F_L0o_L0;
+          newtonEuler(robot, jointSwing(robot.joints, t), feltMotion(P, X_PL0, Vec3::Zero()))
+              .F_L0o_L0;
       const Wrench F_Io_I = transfer(P.X * X_PL0, F_L0o_L0);
       ASSERT_LT((F_Io_I.stacked() - rate).norm(), 1e-6 * (1.0 + rate.norm()));
     }
@@ -129,8 +130,9 @@ TEST_P(JointEfforts, EqualKdlOnAFixedBase) {
       s.q_dot(i) = qd(i) = u(random);
       s.q_ddot(i) = qdd(i) = u(random);
     }
-    ASSERT_GE(solver.CartToJnt(q, qd, qdd, KDL::Wrenches(chain.getNrOfSegments(), KDL::Wrench::Zero()),
-                               tau), 0);
+    ASSERT_GE(solver.CartToJnt(q, qd, qdd,
+                               KDL::Wrenches(chain.getNrOfSegments(), KDL::Wrench::Zero()), tau),
+              0);
     const JointVector ours = newtonEuler(robot, s, base).tau;
     for (unsigned i = 0; i < n; ++i) ASSERT_NEAR(ours(i), tau(i), 1e-10 * (1.0 + std::abs(tau(i))));
   }

@@ -100,7 +100,8 @@ TEST(Decode, TakesExactlyOneMessage) {
   EXPECT_FALSE(decode<leg_command_t>(bytes.data(), n));
 }
 
-// --- Log ------------------------------------------------------------------------------------------
+// --- Log
+// ------------------------------------------------------------------------------------------
 
 class Log : public testing::Test {
  protected:
@@ -194,7 +195,8 @@ TEST_F(Log, NoDamageEverCrashesTheReader) {
   }
 }
 
-// --- Bus: inside a network of its own --------------------------------------------------------------
+// --- Bus: inside a network of its own
+// --------------------------------------------------------------
 
 class PrivateBus : public testing::Test {
  protected:
@@ -256,11 +258,11 @@ TEST_F(PrivateBus, OneControllerHasTheLegs) {
   send(2, 1, false);
   send(1, 1, true);
   EXPECT_EQ(taken(), 1000);
-  send(1, 0, true);       // out of order
+  send(1, 0, true);  // out of order
   EXPECT_EQ(taken(), 0);
   now += PlantLink::kSilence + 1;
   link.setTime(now);
-  send(2, 2, true);       // the first is silent
+  send(2, 2, true);  // the first is silent
   EXPECT_EQ(taken(), 2000);
   for (int i = 0; i < 20; ++i) bus.wait(10);
   EXPECT_TRUE(first.takeRival());
@@ -278,8 +280,8 @@ TEST_F(PrivateBus, RandomBytesOnEveryChannelAreNobodys) {
   for (int k = 0; k < 3000; ++k) {
     std::vector<std::uint8_t> noise(random() % 600);
     for (auto& b : noise) b = static_cast<std::uint8_t>(random());
-    for (const std::string& channel : {channel::kSample, channel::kLegCommand, channel::kOperator,
-                                       channel::kRobot}) {
+    for (const std::string& channel :
+         {channel::kSample, channel::kLegCommand, channel::kOperator, channel::kRobot}) {
       raw.publish(channel, noise.data(), static_cast<unsigned>(noise.size()));
       ++sent;
     }

@@ -22,8 +22,7 @@ std::string readFile(const std::filesystem::path& path, const std::string& asked
   std::error_code error;
   const std::string what = asked_by + path.string() + ": ";
   if (!std::filesystem::exists(path, error)) throw InputError(what + "no such file");
-  if (!std::filesystem::is_regular_file(path, error))
-    throw InputError(what + "not a file");
+  if (!std::filesystem::is_regular_file(path, error)) throw InputError(what + "not a file");
   if (std::filesystem::file_size(path, error) > kMaxFileSize || error)
     throw InputError(what + fmt::format("too large, at most {} bytes", kMaxFileSize));
   std::ifstream in(path, std::ios::binary);
@@ -55,8 +54,7 @@ class Converter {
     }
     switch (node.Type()) {
       case YAML::NodeType::Undefined:
-      case YAML::NodeType::Null:
-        break;
+      case YAML::NodeType::Null: break;
       case YAML::NodeType::Scalar:
         value.kind = Value::Kind::kScalar;
         value.text = node.Scalar();
@@ -71,8 +69,8 @@ class Converter {
           if (!entry.first.IsScalar()) refuse("a key that is not a word");
           const std::string& key = entry.first.Scalar();
           if (value.find(key))
-            throw InputError(fmt::format("{}:{}: {}: given twice", *file_,
-                                         entry.first.Mark().line + 1, key));
+            throw InputError(
+                fmt::format("{}:{}: {}: given twice", *file_, entry.first.Mark().line + 1, key));
           value.keys.push_back(key);
           value.children.push_back(convert(entry.second, depth + 1));
           // An empty value has no position of its own.
@@ -159,18 +157,15 @@ Value load(const std::filesystem::path& path, const std::string& asked_by, int d
 void emit(YAML::Emitter& out, const Value& value) {
   if (!value.tag.empty()) out << YAML::LocalTag(value.tag);
   switch (value.kind) {
-    case Value::Kind::kNull:
-      out << YAML::Null;
-      break;
+    case Value::Kind::kNull: out << YAML::Null; break;
     case Value::Kind::kScalar:
       if (value.text.find('\n') != std::string::npos)
         out << YAML::DoubleQuoted;  // keeps every byte of a URDF
       out << value.text;
       break;
     case Value::Kind::kList: {
-      const bool flat = std::all_of(value.children.begin(), value.children.end(), [](const Value& v) {
-        return v.kind == Value::Kind::kScalar;
-      });
+      const bool flat = std::all_of(value.children.begin(), value.children.end(),
+                                    [](const Value& v) { return v.kind == Value::Kind::kScalar; });
       if (flat) out << YAML::Flow;
       out << YAML::BeginSeq;
       for (const Value& child : value.children) emit(out, child);
@@ -319,8 +314,7 @@ std::string Section::text(std::string_view key) {
   return value.text;
 }
 
-std::string Section::choice(std::string_view key,
-                            std::initializer_list<std::string_view> allowed) {
+std::string Section::choice(std::string_view key, std::initializer_list<std::string_view> allowed) {
   const Value& value = need(key);
   if (value.kind != Value::Kind::kScalar ||
       std::find(allowed.begin(), allowed.end(), value.text) == allowed.end())
@@ -369,7 +363,8 @@ Section Section::section(std::string_view key) {
 
 std::vector<Section> Section::list(std::string_view key) {
   const Value& value = need(key);
-  if (value.kind != Value::Kind::kList) fail(key, fmt::format("is {}, want a list", kindName(value)));
+  if (value.kind != Value::Kind::kList)
+    fail(key, fmt::format("is {}, want a list", kindName(value)));
   std::vector<Section> out;
   for (std::size_t i = 0; i < value.children.size(); ++i)
     out.emplace_back(value.children[i],

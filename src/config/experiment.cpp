@@ -60,8 +60,7 @@ RigidBody readBox(Section s) {
   const Vec3 size = s.vector("size_m", 3, 0.0, 10.0);
   if (s.has("center_m")) box.p_BoBcm_B = s.vector("center_m", 3, -10.0, 10.0);
   const Vec3 q = size.cwiseAbs2();
-  box.I_Bcm_B =
-      (box.mass / 12.0 * Vec3(q.y() + q.z(), q.x() + q.z(), q.x() + q.y())).asDiagonal();
+  box.I_Bcm_B = (box.mass / 12.0 * Vec3(q.y() + q.z(), q.x() + q.z(), q.x() + q.y())).asDiagonal();
   s.finish();
   return box;
 }
@@ -89,14 +88,16 @@ Legs readLegs(Section s) {
   legs.actuator.length_max = s.number("stroke_max_m", legs.actuator.length_min, 10.0);
   legs.transducer.offset = s.number("offset_m", 0.0, 10.0);
   legs.transducer.scale = kMetrePerInch / s.number("counts_per_in", 1.0, 1e6);
-  const double reach = legs.transducer.offset + legs.transducer.scale * plant::Temposonics::kMaxCount;
+  const double reach =
+      legs.transducer.offset + legs.transducer.scale * plant::Temposonics::kMaxCount;
   if (legs.actuator.length_min < legs.transducer.offset || legs.actuator.length_max > reach)
-    s.fail("offset_m", fmt::format("the 14-bit transducer sees {:.4f} to {:.4f} m, the stroke is {} "
-                                   "to {} m; want the stroke inside",
-                                   legs.transducer.offset, reach, legs.actuator.length_min,
-                                   legs.actuator.length_max));
+    s.fail("offset_m",
+           fmt::format("the 14-bit transducer sees {:.4f} to {:.4f} m, the stroke is {} "
+                       "to {} m; want the stroke inside",
+                       legs.transducer.offset, reach, legs.actuator.length_min,
+                       legs.actuator.length_max));
   legs.filters = s.choice("filters", {"none", "outputs"}) == "none" ? plant::LegFilters::kNone
-                                                                     : plant::LegFilters::kOutputs;
+                                                                    : plant::LegFilters::kOutputs;
   legs.filter_cutoff = s.number("filter_cutoff_rad_per_s", 1e-3, 1e6);
   s.finish();
   legs.codec.offset.setConstant(legs.transducer.offset);
@@ -160,8 +161,9 @@ Mat6 readMatrix(Section& s, std::string_view key, bool semidefinite) {
     A = s.matrix(key, 6, 6, -kAny, kAny);
   const std::string fault = definitenessFault(A, semidefinite);
   if (!fault.empty())
-    s.fail(s.has(std::string(key) + "_diagonal") ? std::string(key) + "_diagonal" : std::string(key),
-           fault);
+    s.fail(
+        s.has(std::string(key) + "_diagonal") ? std::string(key) + "_diagonal" : std::string(key),
+        fault);
   return A;
 }
 
@@ -174,8 +176,7 @@ ModalModel readBase(Section s) {
     return modesOf(M, C, K);
   }
   Section modes = s.section("modes");
-  const Eigen::VectorXd omega =
-      2.0 * M_PI * modes.vector("frequency_hz", -1, 0.0, 1e4);
+  const Eigen::VectorXd omega = 2.0 * M_PI * modes.vector("frequency_hz", -1, 0.0, 1e4);
   const auto k = static_cast<int>(omega.size());
   if (k > kMaxModes)
     modes.fail("frequency_hz", fmt::format("{} modes, want at most {}", k, kMaxModes));
@@ -237,10 +238,11 @@ class ProgramReader {
   void read(Section& root) {
     const std::vector<Section> items = root.list("program");
     if (items.empty() || items.size() > kMaxSegments)
-      root.fail("program", fmt::format("has {} segments, want 1 to {}", items.size(), kMaxSegments));
+      root.fail("program",
+                fmt::format("has {} segments, want 1 to {}", items.size(), kMaxSegments));
     for (Section item : items) {
-      Segment& segment = out_.controller.program.segments[static_cast<std::size_t>(
-          out_.controller.program.size)];
+      Segment& segment =
+          out_.controller.program.segments[static_cast<std::size_t>(out_.controller.program.size)];
       readSegment(item, segment);
       if (item.has("robot"))
         for (Section event : item.list("robot")) readRobotEvent(event);
@@ -253,8 +255,8 @@ class ProgramReader {
 
  private:
   void readSegment(Section& item, Segment& segment) {
-    const std::string kind = item.onlyKey({"calibration", "move", "trajectory", "admittance"},
-                                          {"robot", "switches"});
+    const std::string kind =
+        item.onlyKey({"calibration", "move", "trajectory", "admittance"}, {"robot", "switches"});
     Section s = item.section(kind);
     if (kind == "calibration") {
       segment.kind = SegmentKind::kCalibration;
@@ -302,7 +304,8 @@ class ProgramReader {
     if (!robot_) s.fail("joint", fmt::format("'{}', but there is no robot", joint));
     const auto at = std::find(robot_->joint_names.begin(), robot_->joint_names.end(), joint);
     if (at == robot_->joint_names.end())
-      s.fail("joint", fmt::format("'{}', want one of {}", joint, fmt::join(robot_->joint_names, ", ")));
+      s.fail("joint",
+             fmt::format("'{}', want one of {}", joint, fmt::join(robot_->joint_names, ", ")));
     event.move.joint = static_cast<int>(at - robot_->joint_names.begin());
     event.move.target =
         s.number("to_deg_or_m", -1e6, 1e6) * jointUnit(robot_->model.link(event.move.joint));
@@ -400,10 +403,10 @@ Experiment build(const Value& document) {
   p.gravity = c.gravity;
   const Vec6 L = legLengths(p.geometry, p.geometry.fromHome(p.initial_pose));
   if (L.minCoeff() < p.actuator.length_min || L.maxCoeff() > p.actuator.length_max)
-    root.fail("initial_pose",
-              fmt::format("takes legs of {:.4f} to {:.4f} m, want the stroke of {} to {} m",
-                          L.minCoeff(), L.maxCoeff(), p.actuator.length_min,
-                          p.actuator.length_max));
+    root.fail(
+        "initial_pose",
+        fmt::format("takes legs of {:.4f} to {:.4f} m, want the stroke of {} to {} m", L.minCoeff(),
+                    L.maxCoeff(), p.actuator.length_min, p.actuator.length_max));
 
   ProgramReader(has_robot ? &urdf : nullptr, out).read(root);
   root.finish();

@@ -75,8 +75,7 @@ class Loader {
     if (urdf && messages.first.empty() && urdf->getRoot()) return urdf;
     std::string what = messages.first.empty() ? "has no root link" : messages.first;
     std::replace(what.begin(), what.end(), '\n', ' ');
-    throw InputError(
-        fmt::format("{}:{}: not a usable URDF: {}", file_, lineOfQuoted(what), what));
+    throw InputError(fmt::format("{}:{}: not a usable URDF: {}", file_, lineOfQuoted(what), what));
   }
 
   void addJoint(const urdf::Joint& joint, const Transform& X_parent) {
@@ -134,20 +133,21 @@ class Loader {
              fmt::format("principal moment of inertia {}, want at least 0", principal(0)));
     if (principal(2) > (principal(0) + principal(1)) * (1.0 + 1e-9))
       robot_.warnings.push_back(fmt::format(
-          "{}:{}: link '{}': principal moments {:.4g}, {:.4g}, {:.4g} kg m^2: no rigid body has one "
+          "{}:{}: link '{}': principal moments {:.4g}, {:.4g}, {:.4g} kg m^2: no rigid body has "
+          "one "
           "larger than the sum of the others; used as given",
           file_, lineOf("link", link.name), link.name, principal(0), principal(1), principal(2)));
     RobotModel& model = robot_.model;
-    RigidBody& carrier =
-        model.joints == 0 ? model.base
-                          : model.links[static_cast<std::size_t>(model.joints - 1)].body;
+    RigidBody& carrier = model.joints == 0
+                             ? model.base
+                             : model.links[static_cast<std::size_t>(model.joints - 1)].body;
     carrier = combine(carrier, X_body_link, body);
   }
 
   [[noreturn]] void refuse(const char* element, const std::string& name,
                            const std::string& what) const {
-    throw InputError(fmt::format("{}:{}: {} '{}': {}", file_, lineOf(element, name), element, name,
-                                 what));
+    throw InputError(
+        fmt::format("{}:{}: {} '{}': {}", file_, lineOf(element, name), element, name, what));
   }
 
   /// Line of <element name="name">; urdfdom keeps no positions.
@@ -171,8 +171,8 @@ class Loader {
   }
 
   int lineAt(std::size_t offset) const {
-    return 1 + static_cast<int>(std::count(text_.begin(),
-                                           text_.begin() + static_cast<std::ptrdiff_t>(offset), '\n'));
+    return 1 + static_cast<int>(std::count(
+                   text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(offset), '\n'));
   }
 
   const std::string& text_;

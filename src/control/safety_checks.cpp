@@ -105,8 +105,8 @@ bool JointAxes::check(const SafetyLimits& limits, const Geometry& geometry,
   bool inside = true;
   for (std::size_t i = 0; i < kLegs; ++i) {
     const Vec3 along = (X_IP * geometry.p_PPi_P[i] - geometry.p_IBi_I[i]).normalized();
-    inside = inside && along.dot(base_I_[i]) >= least &&
-             along.dot(X_IP.R * platform_P_[i]) >= least;
+    inside =
+        inside && along.dot(base_I_[i]) >= least && along.dot(X_IP.R * platform_P_[i]) >= least;
   }
   return inside;
 }

@@ -83,8 +83,7 @@ void TestPlatform::readSample(const TickInput& in) noexcept {
   state_.sample_sequence = sample.sequence;
 
   state_.L_measured = legLengths(config_.legs, sample.legs);
-  const ForwardSolution forward =
-      forwardPose(config_.geometry, state_.L_measured, X_IP_measured_);
+  const ForwardSolution forward = forwardPose(config_.geometry, state_.L_measured, X_IP_measured_);
   legs_solved_ = forward.ok();
   if (legs_solved_) X_IP_measured_ = forward.X_IP;
   state_.measured = config_.geometry.toHome(X_IP_measured_);
@@ -122,8 +121,7 @@ void TestPlatform::choosePhase(Request request) noexcept {
       if (n_ >= steps_) state_.phase = Phase::kParked;
       break;
     case Phase::kParked:
-    case Phase::kStopped:
-      break;
+    case Phase::kStopped: break;
   }
 }
 
@@ -196,15 +194,11 @@ double TestPlatform::gentleDuration(const Vec6& from, const Vec6& to) const noex
 PathPoint<6> TestPlatform::nextMotion(const Sample& sample) noexcept {
   switch (state_.phase) {
     case Phase::kDisarmed:
-    case Phase::kArmed:
-      return atRest(state_.measured.stacked());
-    case Phase::kReturning:
-      return moveAt(++n_);  // where it starts, the platform is already
+    case Phase::kArmed: return atRest(state_.measured.stacked());
+    case Phase::kReturning: return moveAt(++n_);  // where it starts, the platform is already
     case Phase::kParked:
-    case Phase::kStopped:
-      return atRest(state_.motion.x);
-    case Phase::kRunning:
-      break;
+    case Phase::kStopped: return atRest(state_.motion.x);
+    case Phase::kRunning: break;
   }
   const std::int64_t n = ++n_;
   switch (segment().kind) {
@@ -216,12 +210,12 @@ PathPoint<6> TestPlatform::nextMotion(const Sample& sample) noexcept {
         if (calibration_.complete()) state_.bias = calibration_.mean();
       }
       return atRest(state_.motion.x);
-    case SegmentKind::kMove:
-      return moveAt(n);
+    case SegmentKind::kMove: return moveAt(n);
     case SegmentKind::kTrajectory:
       return trajectoryGeneration(segment().trajectory, segment_start_, n, steps_, period_);
     case SegmentKind::kAdmittance:
-      // A wrench that is no number must not enter the model's state; the finite check stops the run.
+      // A wrench that is no number must not enter the model's state; the finite check stops the
+      // run.
       if (state_.dynamic.stacked().allFinite()) admittance_.step(state_.dynamic);
       return admittance_.motion();
   }

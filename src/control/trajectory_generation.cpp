@@ -5,15 +5,14 @@
 
 namespace ves {
 
-PathPoint<6> trajectoryGeneration(const Trajectory& trajectory, const Vec6& initial,
-                                  std::int64_t n, std::int64_t steps, double period) noexcept {
+PathPoint<6> trajectoryGeneration(const Trajectory& trajectory, const Vec6& initial, std::int64_t n,
+                                  std::int64_t steps, double period) noexcept {
   PathPoint<6> out;
   out.x = initial;
   for (int i = 0; i < 6; ++i) {
     const Axis& axis = trajectory[static_cast<std::size_t>(i)];
     switch (axis.motion) {
-      case AxisMotion::kHold:
-        break;
+      case AxisMotion::kHold: break;
       case AxisMotion::kRamp: {
         if (n >= steps) {
           out.x(i) = axis.final;

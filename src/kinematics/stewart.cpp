@@ -47,8 +47,8 @@ LegMotion legMotion(const Geometry& geometry, const BodyMotion& P) noexcept {
   LegMotion out;
   for (int i = 0; i < kLegs; ++i) {
     const Leg l = leg(geometry, P.X, i);
-    const Vec3 v = P.v + P.w.cross(l.r);                                        // v_Pi
-    const Vec3 a = P.a + P.alpha.cross(l.r) + P.w.cross(P.w.cross(l.r));        // a_Pi
+    const Vec3 v = P.v + P.w.cross(l.r);                                  // v_Pi
+    const Vec3 a = P.a + P.alpha.cross(l.r) + P.w.cross(P.w.cross(l.r));  // a_Pi
     const double L = l.d.norm();
     const double L_dot = l.d.dot(v) / L;
     out.L(i) = L;
@@ -91,7 +91,8 @@ ForwardSolution forwardPose(const Geometry& geometry, const Vec6& L,
     }
     if (out.residual <= kForwardTolerance) {
       // One step of the polar iteration: warm starts must not let R drift from orthogonality.
-      out.X_IP.R = 0.5 * out.X_IP.R * (3.0 * Mat3::Identity() - out.X_IP.R.transpose() * out.X_IP.R);
+      out.X_IP.R =
+          0.5 * out.X_IP.R * (3.0 * Mat3::Identity() - out.X_IP.R.transpose() * out.X_IP.R);
       out.status = SolveStatus::kConverged;
       return out;
     }

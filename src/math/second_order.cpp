@@ -27,10 +27,10 @@ double stepResponseSeries(double k, double c, double T) {
 }  // namespace
 
 SecondOrderHold discretise(double k, double c, double T) noexcept {
-  const double a = 0.5 * c;        // zeta omega
-  const double q2 = k - a * a;     // omega_d^2, negative when overdamped
-  double cosine, sine_over_q;      // e^{-aT} cos(qT), e^{-aT} sin(qT)/q, continued to q2 <= 0
-  double y_step;                   // y after T under u = 1
+  const double a = 0.5 * c;     // zeta omega
+  const double q2 = k - a * a;  // omega_d^2, negative when overdamped
+  double cosine, sine_over_q;   // e^{-aT} cos(qT), e^{-aT} sin(qT)/q, continued to q2 <= 0
+  double y_step;                // y after T under u = 1
   if (q2 * T * T < -0.01) {
     // Overdamped: the two real roots; the slow one without cancellation.
     const double p = std::sqrt(-q2);
@@ -55,7 +55,8 @@ SecondOrderHold discretise(double k, double c, double T) noexcept {
     y_step = k * T * T > 1.0 ? (1.0 - (cosine + a * sine_over_q)) / k : stepResponseSeries(k, c, T);
   }
   SecondOrderHold hold;
-  // (D.6) with (D.7): phi_1 = cosine - a sine/q, phi_2 = c sine/q, phi_3 = sine/q, phi_4 = -k sine/q.
+  // (D.6) with (D.7): phi_1 = cosine - a sine/q, phi_2 = c sine/q, phi_3 = sine/q, phi_4 = -k
+  // sine/q.
   hold.Phi << cosine + a * sine_over_q, sine_over_q,  //
       -k * sine_over_q, cosine - a * sine_over_q;
   // Gamma = -A^-1 (I - Phi) B. (D.8) prints A^-1(1,2) as -1/omega; it is -1/omega^2. The second

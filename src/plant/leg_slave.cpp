@@ -11,9 +11,7 @@ LegSlave::LegSlave(const LegSlaveGains& gains, std::int32_t count) noexcept : ga
 
 void LegSlave::read(std::int32_t count, std::int32_t reference) noexcept {
   switch (phase_++) {
-    case 0:
-      first_ = count;
-      return;
+    case 0: first_ = count; return;
     case 1: {
       // X(k) in half counts, so that the average of two readings stays exact.
       const std::int64_t X = first_ + count;
@@ -22,12 +20,10 @@ void LegSlave::read(std::int32_t count, std::int32_t reference) noexcept {
       std::copy_backward(history_.begin(), history_.end() - 1, history_.end());
       history_[0] = X;
       const std::int64_t digits = (U + 256) >> 9;
-      code_ = static_cast<std::int32_t>(
-          std::clamp<std::int64_t>(digits, -kFullScale, kFullScale));
+      code_ = static_cast<std::int32_t>(std::clamp<std::int64_t>(digits, -kFullScale, kFullScale));
       return;
     }
-    default:
-      phase_ = 0;
+    default: phase_ = 0;
   }
 }
 

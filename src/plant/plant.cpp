@@ -181,8 +181,7 @@ void Plant::look() noexcept {
   guess.p += dt * truth_.P.v;
   guess.R = rotationOf(dt * truth_.P.w) * guess.R;
   const ForwardSolution forward = forwardPose(config_.geometry, legs.L, guess);
-  truth_.legs_agree =
-      forward.ok() && forwardMotion(config_.geometry, forward.X_IP, legs, truth_.P);
+  truth_.legs_agree = forward.ok() && forwardMotion(config_.geometry, forward.X_IP, legs, truth_.P);
   truth_.joints = jointsNow();
 
   const Wrench F_So_S = sensorLoad();

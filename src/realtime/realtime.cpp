@@ -49,9 +49,8 @@ bool claimRealtime(int priority, bool required) {
   else if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0)
     refused = "locked memory";
   if (!refused) return true;
-  const std::string reason =
-      fmt::format("{} refused: {} (see ulimit -r and -l, or run as root)", refused,
-                  std::strerror(errno));
+  const std::string reason = fmt::format("{} refused: {} (see ulimit -r and -l, or run as root)",
+                                         refused, std::strerror(errno));
   if (required) throw InputError("--realtime: " + reason);
   return false;
 }

@@ -76,10 +76,10 @@ std::optional<Difference> compare(const Message& recorded, const Message& replay
     if (first || raw(value) == other) return;
     auto got = value;
     std::memcpy(&got, other.data(), sizeof got);
-    first = Difference{recorded.header.sequence, 0,
-                       fmt::format("{}.{}{}", Message::getTypeName(), name,
-                                   i < 0 ? "" : fmt::format("[{}]", i)),
-                       fmt::format("{}", +value), fmt::format("{}", +got)};
+    first = Difference{
+        recorded.header.sequence, 0,
+        fmt::format("{}.{}{}", Message::getTypeName(), name, i < 0 ? "" : fmt::format("[{}]", i)),
+        fmt::format("{}", +value), fmt::format("{}", +got)};
   });
   return first;
 }
@@ -113,14 +113,18 @@ class Replayer {
   ReplayResult run() {
     LogReader reader(log_);
     while (reader.next(event_)) {
-      if (event_.channel == channel::kExperiment) configure();
-      else if (event_.channel == channel::kSample) keepSample();
-      else if (event_.channel == channel::kState) replayTick();
-      else if (event_.channel == channel::kLegCommand) compareCommand();
+      if (event_.channel == channel::kExperiment)
+        configure();
+      else if (event_.channel == channel::kSample)
+        keepSample();
+      else if (event_.channel == channel::kState)
+        replayTick();
+      else if (event_.channel == channel::kLegCommand)
+        compareCommand();
     }
     if (!platform_)
-      throw InputError(fmt::format("{}: no configuration in this log (channel {})", log_,
-                                   channel::kExperiment));
+      throw InputError(
+          fmt::format("{}: no configuration in this log (channel {})", log_, channel::kExperiment));
     if (result_.ticks == 0)
       throw InputError(fmt::format("{}: no tick of a controller in this log (channel {})", log_,
                                    channel::kState));
@@ -163,8 +167,9 @@ class Replayer {
     if (recorded.header.source != controller_) return;  // another one on the bus
     if (recorded.count != result_.ticks)
       fail(result_.ticks == 0
-               ? fmt::format("the log begins {} ticks after its controller; a replay needs the first",
-                             recorded.count)
+               ? fmt::format(
+                     "the log begins {} ticks after its controller; a replay needs the first",
+                     recorded.count)
                : fmt::format("{} ticks before tick {} are missing", recorded.count - result_.ticks,
                              recorded.header.sequence));
     TickInput in;
@@ -217,8 +222,8 @@ class Replayer {
     if (!(options_.speed > 0.0)) return;
     const std::int64_t now = monotonicNow();
     if (result_.ticks == 0) start_ = now;
-    const auto due = start_ + static_cast<std::int64_t>(static_cast<double>(result_.ticks * period_) /
-                                                        options_.speed);
+    const auto due = start_ + static_cast<std::int64_t>(
+                                  static_cast<double>(result_.ticks * period_) / options_.speed);
     const timespec until{due / 1'000'000'000, due % 1'000'000'000};
     clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr);
   }

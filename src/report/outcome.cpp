@@ -29,7 +29,9 @@ std::string writeOutcome(const std::filesystem::path& folder, const RunResult& r
   if (plots)
     for (const std::filesystem::path& plot : drawPlots(series, folder))
       files += ", " + plot.filename().string();
-  return out + fmt::format("  {}\n    {}\n", folder.lexically_relative(std::filesystem::current_path()).string(), files);
+  const std::filesystem::path here = folder.lexically_relative(std::filesystem::current_path());
+  const bool below = !here.empty() && *here.begin() != "..";
+  return out + fmt::format("  {}\n    {}\n", (below ? here : folder).string(), files);
 }
 
 void Progress::show(Phase phase, int segment, std::int64_t tick, const double (&x)[6]) {
@@ -49,7 +51,9 @@ void Progress::show(Phase phase, int segment, std::int64_t tick, const double (&
         name(experiment_.controller.program.segments[static_cast<std::size_t>(segment)].kind),
         segment + 1, experiment_.controller.program.size);
   const double t = static_cast<double>(tick * experiment_.controller.period) * kSecondPerNanosecond;
-  fmt::print(stderr, "{}{:7.2f} s  {:<24} x {:+6.1f}  y {:+6.1f}  z {:+6.1f} mm   alpha {:+6.2f}  beta {:+6.2f}  gamma {:+6.2f} deg{}",
+  fmt::print(stderr,
+             "{}{:7.2f} s  {:<24} x {:+6.1f}  y {:+6.1f}  z {:+6.1f} mm   alpha {:+6.2f}  beta "
+             "{:+6.2f}  gamma {:+6.2f} deg{}",
              terminal ? "\r" : "", t, what, x[0] * 1e3, x[1] * 1e3, x[2] * 1e3, x[3] / kDegree,
              x[4] / kDegree, x[5] / kDegree, terminal ? "" : "\n");
   open_ = terminal;

@@ -63,8 +63,8 @@ Series readSeries(const std::string& log) {
     }
   }
   if (!configured)
-    throw InputError(fmt::format("{}: no configuration in this log (channel {})", log,
-                                 channel::kExperiment));
+    throw InputError(
+        fmt::format("{}: no configuration in this log (channel {})", log, channel::kExperiment));
   for (Row& row : series.rows)
     row.t = static_cast<double>(row.state.header.time_ns - series.rows[0].state.header.time_ns) *
             kSecondPerNanosecond;
@@ -77,17 +77,17 @@ std::vector<Column> columns(const Experiment& experiment) {
   std::vector<Column> out;
   const auto add = [&](std::string name, auto value) { out.push_back({std::move(name), value}); };
   const auto addPose = [&](const char* what, const char* length, const char* angle,
-                           const double (state_t::*field)[6]) {
+                           const double(state_t::*field)[6]) {
     for (int i = 0; i < 6; ++i)
       add(fmt::format("{}_{}_{}", kCoordinate[i], what, i < 3 ? length : angle),
           [=](const Row& r) { return (r.state.*field)[i]; });
   };
-  const auto addWrench = [&](const char* what, const double (state_t::*field)[6]) {
+  const auto addWrench = [&](const char* what, const double(state_t::*field)[6]) {
     for (int i = 0; i < 6; ++i)
       add(fmt::format("{}_{}_{}", kWrench[i], what, i < 3 ? "n" : "nm"),
           [=](const Row& r) { return (r.state.*field)[i]; });
   };
-  const auto addLegs = [&](const char* what, const char* unit, const double (state_t::*field)[6]) {
+  const auto addLegs = [&](const char* what, const char* unit, const double(state_t::*field)[6]) {
     for (int i = 0; i < 6; ++i)
       add(fmt::format("leg{}_{}_{}", i + 1, what, unit),
           [=](const Row& r) { return (r.state.*field)[i]; });
@@ -113,15 +113,13 @@ std::vector<Column> columns(const Experiment& experiment) {
   addLegs("commanded_acceleration", "m_per_s2", &state_t::leg_ddot);
   addLegs("measured", "m", &state_t::leg_measured);
   for (int i = 0; i < static_cast<int>(experiment.joint_names.size()); ++i)
-    add(fmt::format("{}_{}", experiment.joint_names[static_cast<std::size_t>(i)],
-                    experiment.controller.payload.robot.link(i).type == JointType::kRevolute
-                        ? "rad"
-                        : "m"),
+    add(fmt::format(
+            "{}_{}", experiment.joint_names[static_cast<std::size_t>(i)],
+            experiment.controller.payload.robot.link(i).type == JointType::kRevolute ? "rad" : "m"),
         [=](const Row& r) { return r.has_truth ? r.truth.q[i] : NAN; });
   add("tripped_bits", [](const Row& r) { return static_cast<double>(r.state.tripped); });
   add("latched_bits", [](const Row& r) { return static_cast<double>(r.state.latched); });
-  add("sample_sequence",
-      [](const Row& r) { return static_cast<double>(r.state.sample_sequence); });
+  add("sample_sequence", [](const Row& r) { return static_cast<double>(r.state.sample_sequence); });
   add("late_s", [](const Row& r) {
     return r.has_timing ? static_cast<double>(r.timing.late_ns) * kSecondPerNanosecond : NAN;
   });

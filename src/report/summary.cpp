@@ -13,8 +13,8 @@ namespace ves {
 namespace {
 
 constexpr const char* kCoordinate[] = {"x", "y", "z", "alpha", "beta", "gamma"};
-constexpr double kStill = 0.5;    // [s] without commanded motion: the sensor's filter has settled
-constexpr double kMoved = 1e-6;   // [m | rad] least range of a coordinate that counts as moving
+constexpr double kStill = 0.5;   // [s] without commanded motion: the sensor's filter has settled
+constexpr double kMoved = 1e-6;  // [m | rad] least range of a coordinate that counts as moving
 
 bool running(const Row& row) { return row.state.phase == static_cast<int>(Phase::kRunning); }
 
@@ -164,12 +164,14 @@ nlohmann::ordered_json summarise(const Series& series, const RunResult& result) 
 }
 
 std::string table(const nlohmann::ordered_json& s) {
-  const auto number = [&](const std::string& key) { return s.contains(key) ? s[key].get<double>() : NAN; };
+  const auto number = [&](const std::string& key) {
+    return s.contains(key) ? s[key].get<double>() : NAN;
+  };
   std::string out = fmt::format("{}\n\n", s["description"].get<std::string>());
-  out += fmt::format("  ended {} after {:.2f} s ({} ticks), {:.4g} x real time, {} substitute values\n",
-                     s["ended"].get<std::string>(), number("simulated_s"),
-                     s["ticks"].get<std::int64_t>(), number("real_time_factor"),
-                     s["substitute_values"].get<int>());
+  out += fmt::format(
+      "  ended {} after {:.2f} s ({} ticks), {:.4g} x real time, {} substitute values\n",
+      s["ended"].get<std::string>(), number("simulated_s"), s["ticks"].get<std::int64_t>(),
+      number("real_time_factor"), s["substitute_values"].get<int>());
   if (!s["trips"].empty())
     out += fmt::format("  stopped in tick {} by: {}\n", s["first_cause_tick"].get<std::int64_t>(),
                        s["first_cause"].get<std::string>());
@@ -195,9 +197,9 @@ std::string table(const nlohmann::ordered_json& s) {
   for (const char* when : {"still", "moving"}) {
     const std::string force = fmt::format("dynamic_force_max_{}_n", when);
     if (s.contains(force))
-      out += fmt::format("  wrench without gravity, platform {:<7} at most {:8.3f} N, {:8.3f} N m\n",
-                         when, number(force),
-                         number(fmt::format("dynamic_moment_max_{}_nm", when)));
+      out +=
+          fmt::format("  wrench without gravity, platform {:<7} at most {:8.3f} N, {:8.3f} N m\n",
+                      when, number(force), number(fmt::format("dynamic_moment_max_{}_nm", when)));
   }
   if (s.contains("wake_up_late_median_s"))
     out += fmt::format(

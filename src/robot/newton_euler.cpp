@@ -19,8 +19,8 @@ Wrench inertialWrench(const RigidBody& body, const FeltMotion& B) noexcept {
 
 InverseDynamics newtonEuler(const RobotModel& robot, const JointState& q,
                             const FeltMotion& L0) noexcept {
-  std::array<Transform, kMaxJoints> X;   // link i in its parent
-  std::array<Wrench, kMaxJoints> F;      // inertial wrench of link i, about its origin, its axes
+  std::array<Transform, kMaxJoints> X;  // link i in its parent
+  std::array<Wrench, kMaxJoints> F;     // inertial wrench of link i, about its origin, its axes
 
   // Outward: motion of each link, and the wrench it takes.
   FeltMotion parent = L0;

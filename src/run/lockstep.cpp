@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/realtime/realtime.hpp"
-#include "ves/run/run.hpp"
 #include "ves/run/ending.hpp"
+#include "ves/run/run.hpp"
 #include "ves/transport/channels.hpp"
 
 namespace ves {
@@ -33,7 +33,8 @@ RunResult runLockstep(const Experiment& experiment, LogWriter* log, const Watch&
   in.request = Request::kStart;
   for (;; ++in.tick) {
     in.sample = plant.sample();
-    record(channel::kTruth, toMessage(plant.truth(), header(machine, in.sample.sequence, plant.time())));
+    record(channel::kTruth,
+           toMessage(plant.truth(), header(machine, in.sample.sequence, plant.time())));
     record(channel::kSample, toMessage(in.sample, machine, in.tick - 1));
 
     const TickState& state = platform.tick(in);

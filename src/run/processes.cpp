@@ -9,16 +9,16 @@
 namespace ves {
 namespace {
 
-constexpr int kControllerPriority = 80;  // [-] SCHED_FIFO
-constexpr int kPlantPriority = 70;       // [-] SCHED_FIFO
-constexpr std::int64_t kPlantPeriod = 2'000'000;         // [ns] between the plant's samples, real time
-constexpr int kAnswerTime = 200;                         // [ms] lockstep, before a message is repeated
-constexpr int kAnswerTries = 50;                         // [-] before the other side counts as gone
+constexpr int kControllerPriority = 80;           // [-] SCHED_FIFO
+constexpr int kPlantPriority = 70;                // [-] SCHED_FIFO
+constexpr std::int64_t kPlantPeriod = 2'000'000;  // [ns] between the plant's samples, real time
+constexpr int kAnswerTime = 200;                  // [ms] lockstep, before a message is repeated
+constexpr int kAnswerTries = 50;                  // [-] before the other side counts as gone
 constexpr std::int64_t kFirstSampleTime = 10'000'000'000;  // [ns]
 
-void conduct(int priority, bool required) {
+void conduct(const char* who, int priority, bool required) {
   if (!claimRealtime(priority, required))
-    fmt::print(stderr, "no real-time privileges: running at best effort\n");
+    fmt::print(stderr, "{}: no real-time privileges, running at best effort\n", who);
 }
 
 }  // namespace
@@ -35,15 +35,13 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
   if (!options.log.empty()) {
     log = std::make_unique<LogWriter>(options.log);
     log->write(channel::kExperiment, describe(experiment, self, 0), 0);
-    bus.subscribe("VES_(SAMPLE|TRUTH)",
-                  [&log](const std::string& channel, const void* data, std::uint32_t size) {
-                    const auto any = decode<sample_t>(data, size);
-                    const auto truth = decode<truth_t>(data, size);
-                    const std::int64_t time = any     ? any->header.time_ns
-                                              : truth ? truth->header.time_ns
-                                                      : 0;
-                    log->write(channel, data, size, time);
-                  });
+    bus.subscribe("VES_(SAMPLE|TRUTH)", [&log](const std::string& channel, const void* data,
+                                               std::uint32_t size) {
+      const auto any = decode<sample_t>(data, size);
+      const auto truth = decode<truth_t>(data, size);
+      const std::int64_t time = any ? any->header.time_ns : truth ? truth->header.time_ns : 0;
+      log->write(channel, data, size, time);
+    });
   }
   bus.publish(channel::kExperiment, describe(experiment, self, monotonicNow()));
 
@@ -59,8 +57,8 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
   };
 
   if (options.lockstep) {
-    // The machine advances one period for each command and answers with one sample. A lost message is
-    // repeated; the answer to a repeated one is the same sample again.
+    // The machine advances one period for each command and answers with one sample. A lost message
+    // is repeated; the answer to a repeated one is the same sample again.
     LegCommand none;
     leg_command_t out = toMessage(none, header(self, -1, 0));
     for (;; ++in.tick) {
@@ -88,7 +86,7 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
     return ending.result(monotonicNow() - start);
   }
 
-  conduct(kControllerPriority, options.realtime);
+  conduct("controller", kControllerPriority, options.realtime);
   while (link.sample().sequence < 0) {
     if (monotonicNow() - start > kFirstSampleTime)
       throw InputError(fmt::format("bus {}: no machine to be heard", options.url));
@@ -161,7 +159,7 @@ void runPlant(const Experiment& experiment, const ProcessOptions& options,
     return;
   }
 
-  conduct(kPlantPriority, options.realtime);
+  conduct("plant", kPlantPriority, options.realtime);
   const std::int64_t start = monotonicNow();
   Ticker ticker(kPlantPeriod);
   while (!stop()) {

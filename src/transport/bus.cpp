@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/transport/bus.hpp"
 
+#include <arpa/inet.h>
 #include <fmt/format.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <cstdio>
 
@@ -14,17 +17,43 @@ namespace {
 // Ten samples wait at each tick in the worst case; a stalled controller must still find the newest.
 constexpr int kQueue = 4096;  // [-] messages
 
-/// LCM itself would print, and go on with part of an address.
+/// The url, if LCM may have it: it would print, or go on with part of an address.
 const std::string& checked(const std::string& url) {
   unsigned a, b, c, d, port;
   int end = 0;
-  const int read = std::sscanf(url.c_str(), "udpm://%3u.%3u.%3u.%3u:%5u%n", &a, &b, &c, &d, &port, &end);
+  const int read =
+      std::sscanf(url.c_str(), "udpm://%3u.%3u.%3u.%3u:%5u%n", &a, &b, &c, &d, &port, &end);
   const std::string rest = url.substr(static_cast<std::size_t>(end));
   if (read != 5 || end == 0 || a < 224 || a > 239 || b > 255 || c > 255 || d > 255 || port < 1 ||
       port > 65535 || !(rest.empty() || rest.rfind("?ttl=", 0) == 0))
-    throw InputError(fmt::format("--url {}: want udpm://MULTICAST-ADDRESS:PORT[?ttl=N], for example {}",
-                                 url, kDefaultUrl));
+    throw InputError(fmt::format(
+        "--url {}: want udpm://MULTICAST-ADDRESS:PORT[?ttl=N], for example {}", url, kDefaultUrl));
   return url;
+}
+
+/// True when the kernel knows where multicast should go; LCM prints a page when it does not.
+bool hasRoute() {
+  const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  sockaddr_in to{};
+  to.sin_family = AF_INET;
+  to.sin_port = htons(7667);
+  to.sin_addr.s_addr = inet_addr("239.255.76.67");
+  const bool found = connect(fd, reinterpret_cast<const sockaddr*>(&to), sizeof to) == 0;
+  close(fd);
+  return found;
+}
+
+[[noreturn]] void refuse(const std::string& url) {
+  throw InputError(fmt::format(
+      "bus {}: no message comes back; multicast needs a route on some interface (for one "
+      "machine: ip link set lo multicast on; ip route add 224.0.0.0/4 dev lo), or use "
+      "--private-bus",
+      url));
+}
+
+const std::string& reachable(const std::string& url) {
+  if (!hasRoute()) refuse(checked(url));
+  return checked(url);
 }
 
 /// One message to ourselves, within two seconds.
@@ -46,14 +75,9 @@ bool echoes(lcm::LCM& lcm) {
 
 }  // namespace
 
-Bus::Bus(const std::string& url) : lcm_(checked(url)) {
+Bus::Bus(const std::string& url) : lcm_(reachable(url)) {
   if (!lcm_.good()) throw InputError(fmt::format("--url {}: not a bus that LCM can open", url));
-  if (!echoes(lcm_))
-    throw InputError(
-        fmt::format("bus {}: no message comes back; multicast needs a route on some interface "
-                    "(for one machine: ip link set lo multicast on; ip route add 224.0.0.0/4 dev "
-                    "lo), or use --private-bus",
-                    url));
+  if (!echoes(lcm_)) refuse(url);
 }
 
 void Bus::publish(const std::string& channel, const experiment_t& message) {
@@ -62,7 +86,8 @@ void Bus::publish(const std::string& channel, const experiment_t& message) {
 
 void Bus::subscribe(const std::string& channel, Handler handler) {
   subscribers_.push_back(std::make_unique<Subscriber>(Subscriber{std::move(handler)}));
-  lcm_.subscribe(channel, &Subscriber::receive, subscribers_.back().get())->setQueueCapacity(kQueue);
+  lcm_.subscribe(channel, &Subscriber::receive, subscribers_.back().get())
+      ->setQueueCapacity(kQueue);
 }
 
 void Bus::drain() noexcept {
@@ -73,6 +98,7 @@ void Bus::drain() noexcept {
 bool Bus::wait(int milliseconds) noexcept { return lcm_.handleTimeout(milliseconds) > 0; }
 
 bool busWorks(const std::string& url) {
+  if (!hasRoute()) return checked(url), false;
   lcm::LCM lcm(checked(url));
   return lcm.good() && echoes(lcm);
 }
@@ -83,8 +109,8 @@ ControllerLink::ControllerLink(Bus& bus, const Identity& self) : bus_(bus), self
     const auto sample = message ? fromMessage(*message) : std::nullopt;
     // A plant that was started anew counts from zero; an older one is a ghost.
     const bool renewed = message && message->header.epoch > plant_.epoch;
-    const bool same = message && message->header.epoch == plant_.epoch &&
-                      message->header.source == plant_.source;
+    const bool same =
+        message && message->header.epoch == plant_.epoch && message->header.source == plant_.source;
     if (!sample || !(renewed || (same && sample->sequence >= sample_.sequence))) {
       ++rejected_;
       return;
@@ -101,15 +127,16 @@ ControllerLink::ControllerLink(Bus& bus, const Identity& self) : bus_(bus), self
                   if (message && message->header.source != self_.source && message->engaged)
                     rival_ = true;
                 });
-  bus.subscribe(channel::kOperator, [this](const std::string&, const void* data, std::uint32_t size) {
-    const auto message = decode<operator_t>(data, size);
-    const auto request = message ? fromMessage(*message) : std::nullopt;
-    if (!request) {
-      ++rejected_;
-      return;
-    }
-    if (*request != Request::kNone) request_ = *request;
-  });
+  bus.subscribe(channel::kOperator,
+                [this](const std::string&, const void* data, std::uint32_t size) {
+                  const auto message = decode<operator_t>(data, size);
+                  const auto request = message ? fromMessage(*message) : std::nullopt;
+                  if (!request) {
+                    ++rejected_;
+                    return;
+                  }
+                  if (*request != Request::kNone) request_ = *request;
+                });
 }
 
 void ControllerLink::send(const leg_command_t& command) noexcept {
@@ -141,8 +168,8 @@ PlantLink::PlantLink(Bus& bus) {
 bool PlantLink::mayCommand(const header_t& from, bool engaged) noexcept {
   const bool master = from.source == master_.source && from.epoch == master_.epoch;
   if (!master) {
-    // Others wait until the master lets go or falls silent. A controller that is not engaged asks for
-    // nothing, and takes nothing over from one that is.
+    // Others wait until the master lets go or falls silent. A controller that is not engaged asks
+    // for nothing, and takes nothing over from one that is.
     if (engaged_ && now_ - heard_ < kSilence) return false;
     master_ = {from.source, from.epoch};
     sequence_ = -2;

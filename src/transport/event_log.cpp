@@ -12,10 +12,10 @@
 namespace ves {
 namespace {
 
-constexpr std::uint32_t kSync = 0xEDA1DA01;       // before each event
-constexpr std::int64_t kHeaderSize = 28;          // [B]
-constexpr std::uint32_t kMaxChannel = 63;         // [B] LCM's own limit
-constexpr std::uint32_t kMaxData = 16u << 20;     // [B] far above any message of ours
+constexpr std::uint32_t kSync = 0xEDA1DA01;    // before each event
+constexpr std::int64_t kHeaderSize = 28;       // [B]
+constexpr std::uint32_t kMaxChannel = 63;      // [B] LCM's own limit
+constexpr std::uint32_t kMaxData = 16u << 20;  // [B] far above any message of ours
 
 std::uint64_t bigEndian(const std::uint8_t* bytes, int n) {
   std::uint64_t x = 0;
@@ -25,8 +25,7 @@ std::uint64_t bigEndian(const std::uint8_t* bytes, int n) {
 
 }  // namespace
 
-LogWriter::LogWriter(const std::string& path)
-    : file_(std::make_unique<lcm::LogFile>(path, "w")) {
+LogWriter::LogWriter(const std::string& path) : file_(std::make_unique<lcm::LogFile>(path, "w")) {
   if (!file_->good()) throw InputError(fmt::format("{}: cannot be written", path));
 }
 

@@ -21,9 +21,10 @@ namespace {
 
 void require(bool good, const char* what) {
   if (!good)
-    throw InputError(fmt::format("--private-bus: {}: {}; this machine does not let a process have a "
-                                 "network of its own",
-                                 what, std::strerror(errno)));
+    throw InputError(
+        fmt::format("--private-bus: {}: {}; this machine does not let a process have a "
+                    "network of its own",
+                    what, std::strerror(errno)));
 }
 
 void write(const char* file, const std::string& text) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Speed of the hot paths; read as ratios within one run. KDL's fixed-base solver stands beside ours.
+// Speed of the hot paths; read as ratios within one run. KDL's fixed-base solver stands beside
+// ours.
 #include <benchmark/benchmark.h>
 
 #include <kdl/chainidsolver_recursive_newton_euler.hpp>
@@ -17,7 +18,8 @@ Experiment experiment(const std::string& name) {
   return loadExperiment(test::configDir() + "/scenarios/" + name + ".yaml");
 }
 
-// --- Kinematics -----------------------------------------------------------------------------------
+// --- Kinematics
+// -----------------------------------------------------------------------------------
 
 /// Legs of random poses of the workspace, with a start `share` of the way out from home.
 void forward(benchmark::State& state, double share) {
@@ -39,7 +41,9 @@ void forward(benchmark::State& state, double share) {
   state.counters["failures"] = static_cast<double>(failures);
 }
 void ForwardPoseCold(benchmark::State& state) { forward(state, 0.0); }
-void ForwardPoseWarm(benchmark::State& state) { forward(state, 0.98); }  // 2 % off, as peers measure
+void ForwardPoseWarm(benchmark::State& state) {
+  forward(state, 0.98);
+}  // 2 % off, as peers measure
 BENCHMARK(ForwardPoseCold);
 BENCHMARK(ForwardPoseWarm);
 
@@ -66,7 +70,8 @@ void ForwardRatesAndAccelerations(benchmark::State& state) {
 }
 BENCHMARK(ForwardRatesAndAccelerations);
 
-// --- Dynamics ---------------------------------------------------------------------------------------
+// --- Dynamics
+// ---------------------------------------------------------------------------------------
 
 void newtonEulerOf(benchmark::State& state, const char* name) {
   const RobotModel robot = test::robot(name).model;
@@ -132,7 +137,8 @@ void AdmittanceStep(benchmark::State& state) {
 }
 BENCHMARK(AdmittanceStep)->Arg(6)->Arg(20)->Arg(132);
 
-// --- Whole -------------------------------------------------------------------------------------------
+// --- Whole
+// -------------------------------------------------------------------------------------------
 
 void ControllerTick(benchmark::State& state) {  // admittance control, PUMA, six modes
   const Experiment e = experiment("puma_on_table_4_1");

@@ -64,9 +64,7 @@ struct Swing {
       phase(i) = 6.0 * u(random);
     }
   }
-  Vec6 x(double t) const {
-    return amplitude.array() * (w.array() * t + phase.array()).sin();
-  }
+  Vec6 x(double t) const { return amplitude.array() * (w.array() * t + phase.array()).sin(); }
   Vec6 xDot(double t) const {
     return amplitude.array() * w.array() * (w.array() * t + phase.array()).cos();
   }

@@ -33,8 +33,9 @@ inline KDL::Chain kdlChain(const std::string& name) {
   const auto model = urdf::parseURDF(readText(configDir() + "/robots/" + name + ".urdf"));
   KDL::Chain chain;
   const auto frame = [](const urdf::Pose& p) {
-    return KDL::Frame(KDL::Rotation::Quaternion(p.rotation.x, p.rotation.y, p.rotation.z, p.rotation.w),
-                      KDL::Vector(p.position.x, p.position.y, p.position.z));
+    return KDL::Frame(
+        KDL::Rotation::Quaternion(p.rotation.x, p.rotation.y, p.rotation.z, p.rotation.w),
+        KDL::Vector(p.position.x, p.position.y, p.position.z));
   };
   auto link = model->getRoot();
   while (!link->child_joints.empty()) {
@@ -44,14 +45,15 @@ inline KDL::Chain kdlChain(const std::string& name) {
     const KDL::Vector axis = f.M * KDL::Vector(joint.axis.x, joint.axis.y, joint.axis.z);
     const urdf::Inertial& in = *link->inertial;
     // Inertial frames are not turned in these files.
-    chain.addSegment(KDL::Segment(
-        link->name,
-        KDL::Joint(joint.name, f.p, axis,
-                   joint.type == urdf::Joint::PRISMATIC ? KDL::Joint::TransAxis : KDL::Joint::RotAxis),
-        f,
-        KDL::RigidBodyInertia(
-            in.mass, frame(in.origin).p,
-            KDL::RotationalInertia(in.ixx, in.iyy, in.izz, in.ixy, in.ixz, in.iyz))));
+    chain.addSegment(
+        KDL::Segment(link->name,
+                     KDL::Joint(joint.name, f.p, axis,
+                                joint.type == urdf::Joint::PRISMATIC ? KDL::Joint::TransAxis
+                                                                     : KDL::Joint::RotAxis),
+                     f,
+                     KDL::RigidBodyInertia(
+                         in.mass, frame(in.origin).p,
+                         KDL::RotationalInertia(in.ixx, in.iyy, in.izz, in.ixy, in.ixz, in.iyz))));
   }
   return chain;
 }

@@ -3,9 +3,9 @@
 // YAML documents that remember where each value came from. yaml-cpp parses; this adds what a person
 // needs when a file is wrong: one line, `file:line: key: what is wrong, what is allowed`.
 //
-// A map may start `from: other.yaml` and then names only what differs. A tag says where a number was
-// got: !found (a cited source), !derived (computed from one), !substitute (a stand-in); none: the
-// report's own, or a choice of the experiment. A tag covers what stands below it.
+// A map may start `from: other.yaml` and then names only what differs. A tag says where a number
+// was got: !found (a cited source), !derived (computed from one), !substitute (a stand-in); none:
+// the report's own, or a choice of the experiment. A tag covers what stands below it.
 #pragma once
 
 #include <Eigen/Core>
@@ -31,10 +31,10 @@ class InputError : public std::runtime_error {
 struct Value {
   enum class Kind { kNull, kScalar, kList, kMap };
   Kind kind = Kind::kNull;
-  std::string text;                // of a scalar
-  std::string tag;                 // "substitute", ...; empty
-  std::vector<std::string> keys;   // of a map, beside children
-  std::vector<Value> children;     // of a list or map
+  std::string text;               // of a scalar
+  std::string tag;                // "substitute", ...; empty
+  std::vector<std::string> keys;  // of a map, beside children
+  std::vector<Value> children;    // of a list or map
   std::shared_ptr<const std::string> file;
   int line = 0;
 

@@ -12,8 +12,8 @@
 
 namespace ves {
 
-/// One experiment, complete: what the controller believes, what the plant is, and the text both came
-/// from.
+/// One experiment, complete: what the controller believes, what the plant is, and the text both
+/// came from.
 struct Experiment {
   std::string name;
   std::string description;

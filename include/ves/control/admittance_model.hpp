@@ -20,8 +20,8 @@ struct ModalModel {
   Eigen::MatrixXd damping;    // k x k, [1/s] diagonal (2 zeta omega) when it is proportional
 };
 
-/// Steps a modal model by the exact zero-order hold. Coordinates are those of Pose about home, taken
-/// as small: the wrench's moments drive the fixed angles directly, as in (C.2).
+/// Steps a modal model by the exact zero-order hold. Coordinates are those of Pose about home,
+/// taken as small: the wrench's moments drive the fixed angles directly, as in (C.2).
 class AdmittanceModel {
  public:
   /// Discretises for the period [s]: mode by mode (D.5), or, when damping couples the modes, all
@@ -45,8 +45,8 @@ class AdmittanceModel {
   template <int Rows, int MaxRows, int MaxCols>
   using Matrix = Eigen::Matrix<double, Rows, Eigen::Dynamic, 0, MaxRows, MaxCols>;
   static constexpr int kCoupledStates = 2 * kMaxCoupledModes;
-  using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kCoupledStates,
-                               kCoupledStates>;
+  using Square =
+      Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kCoupledStates, kCoupledStates>;
 
   void stepModes(const Vector<kMaxModes>& u) noexcept;
   void stepCoupled(const Vector<kMaxModes>& u) noexcept;

@@ -8,8 +8,9 @@
 namespace ves {
 
 struct ForceSensor {
-  Mat6 C_proc = Mat6::Identity();  // [N | N m per count] inverse of S_proc (2.6), crosstalk included
-  Transform X_PS;                  // 180 degrees about x, and the sensor's height
+  Mat6 C_proc =
+      Mat6::Identity();  // [N | N m per count] inverse of S_proc (2.6), crosstalk included
+  Transform X_PS;        // 180 degrees about x, and the sensor's height
 };
 
 /// The wrench {W_s} = C_proc ({V_R} - bias), (C.1).
@@ -25,7 +26,8 @@ class Calibration {
  public:
   static constexpr int kSamples = 100;  // [-] per channel
 
-  /// `load` is what the static load alone would read: taken out, so that a known robot may be aboard.
+  /// `load` is what the static load alone would read: taken out, so that a known robot may be
+  /// aboard.
   void add(const AdcCounts& adc, const Vec6& load) noexcept;
   void reset() noexcept { *this = Calibration(); }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Safety checks (Appendix C). Each is one function that tells whether its requirement holds, and one
-// bit. A value that is not a number never satisfies a requirement.
+// Safety checks (Appendix C). Each is one function that tells whether its requirement holds, and
+// one bit. A value that is not a number never satisfies a requirement.
 #pragma once
 
 #include <array>
@@ -26,7 +26,7 @@ enum class Check : std::uint32_t {
   kCollide,
   kVelocity,
   kFlow,
-  kRival,              // somebody else commands the legs
+  kRival,  // somebody else commands the legs
   kCount
 };
 
@@ -51,23 +51,25 @@ class Tripped {
   Tripped operator|(Tripped other) const noexcept { return Tripped(bits_ | other.bits_); }
 
  private:
-  static constexpr std::uint32_t bit(Check check) { return 1u << static_cast<std::uint32_t>(check); }
+  static constexpr std::uint32_t bit(Check check) {
+    return 1u << static_cast<std::uint32_t>(check);
+  }
   std::uint32_t bits_ = 0;
 };
 
 struct SafetyLimits {
-  double leg_velocity = 0.0;      // [m/s] commanded
-  double position_error = 0.0;    // [m] commanded minus measured length
-  double translation = 0.0;       // [m] of each coordinate from home
-  double rotation = 0.0;          // [rad] of each coordinate from home
-  double leg_min = 0.0;           // [m]
-  double leg_max = 0.0;           // [m]
-  double joint_cone = 0.0;        // [rad] half angle about a joint's own axis
-  double leg_clearance = 0.0;     // [m] least distance between the axes of two legs
-  double bore_area = 0.0;         // [m^2] fed when a leg extends
-  double rod_side_area = 0.0;     // [m^2] fed when it retracts
-  double flow = 0.0;              // [m^3/s] of one leg
-  int stale_ticks = 0;            // [-] ticks without a new sample
+  double leg_velocity = 0.0;    // [m/s] commanded
+  double position_error = 0.0;  // [m] commanded minus measured length
+  double translation = 0.0;     // [m] of each coordinate from home
+  double rotation = 0.0;        // [rad] of each coordinate from home
+  double leg_min = 0.0;         // [m]
+  double leg_max = 0.0;         // [m]
+  double joint_cone = 0.0;      // [rad] half angle about a joint's own axis
+  double leg_clearance = 0.0;   // [m] least distance between the axes of two legs
+  double bore_area = 0.0;       // [m^2] fed when a leg extends
+  double rod_side_area = 0.0;   // [m^2] fed when it retracts
+  double flow = 0.0;            // [m^3/s] of one leg
+  int stale_ticks = 0;          // [-] ticks without a new sample
 };
 
 /// Successive commanded lengths differ by no more than leg_velocity allows in one period.

@@ -22,17 +22,17 @@ enum Switch : std::uint32_t { kPanicButtonClosed = 1u, kFloorMatClosed = 2u };
 inline constexpr std::uint32_t kAllSwitchesClosed = kPanicButtonClosed | kFloorMatClosed;
 
 struct Sample {
-  std::int64_t sequence = -1;  // [-] counts up by one; -1: nothing received yet
-  std::int64_t time = 0;       // [ns] the plant's clock when it was taken
-  AdcCounts adc{};             // [count]
-  LegCounts legs{};            // [count] Temposonics
+  std::int64_t sequence = -1;           // [-] counts up by one; -1: nothing received yet
+  std::int64_t time = 0;                // [ns] the plant's clock when it was taken
+  AdcCounts adc{};                      // [count]
+  LegCounts legs{};                     // [count] Temposonics
   JointVector q = JointVector::Zero();  // [rad | m] the robot's joints
   std::uint32_t switches = 0;           // bits of Switch
 };
 
 struct LegCommand {
-  bool engaged = false;  // false: the legs stay where they are and ignore the counts
-  LegCounts counts{};    // [count] (C.13)
+  bool engaged = false;       // false: the legs stay where they are and ignore the counts
+  LegCounts counts{};         // [count] (C.13)
   std::int32_t segment = -1;  // [-] where the program is; other equipment takes its cue from it
 };
 

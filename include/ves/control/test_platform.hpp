@@ -40,7 +40,7 @@ enum class SegmentKind : std::int32_t {
   kCalibration,  // hold, and take the bias of the sensor
   kMove,         // gently to a pose, at rest at both ends
   kTrajectory,
-  kAdmittance    // from wherever the platform is, as the model's state at rest
+  kAdmittance  // from wherever the platform is, as the model's state at rest
 };
 
 std::string_view name(SegmentKind kind) noexcept;
@@ -64,18 +64,18 @@ struct ControllerConfig {
   std::int64_t period = 10'000'000;  // [ns]
   Geometry geometry;
   ForceSensor sensor;
-  Vec6 bias = Vec6::Zero();  // [count] until a calibration replaces it
-  Payload payload;           // as the controller believes it to be
+  Vec6 bias = Vec6::Zero();          // [count] until a calibration replaces it
+  Payload payload;                   // as the controller believes it to be
   Vec3 gravity = {0.0, 0.0, -9.81};  // [m/s^2] g_I
   ModalModel admittance;
   LegCodec legs;
   SafetyLimits safety;
   Program program;
-  double gentle_speed = 0.05;      // [m/s] peak, of moves and the return
-  double gentle_rotation = 0.10;   // [rad/s] peak
-  double gentle_braking = 1.5;     // [m/s^2] mean, when one begins in motion
+  double gentle_speed = 0.05;            // [m/s] peak, of moves and the return
+  double gentle_rotation = 0.10;         // [rad/s] peak
+  double gentle_braking = 1.5;           // [m/s^2] mean, when one begins in motion
   double gentle_rotation_braking = 2.5;  // [rad/s^2] mean
-  int arming_samples = 10;         // [-] consecutive ticks with a new sample before arming
+  int arming_samples = 10;               // [-] consecutive ticks with a new sample before arming
 };
 
 enum class Request : std::int32_t {
@@ -85,31 +85,31 @@ enum class Request : std::int32_t {
 };
 
 struct TickInput {
-  std::int64_t tick = 0;    // [-] counts controller periods, missed ones included
-  Sample sample;            // the newest
+  std::int64_t tick = 0;  // [-] counts controller periods, missed ones included
+  Sample sample;          // the newest
   Request request = Request::kNone;
-  bool rival = false;       // another controller was heard since the last tick
+  bool rival = false;  // another controller was heard since the last tick
 };
 
 /// Everything one tick knew and decided.
 struct TickState {
-  std::int64_t tick = 0;             // [-]
-  std::int64_t count = -1;           // [-] ticks run before this one
+  std::int64_t tick = 0;              // [-]
+  std::int64_t count = -1;            // [-] ticks run before this one
   std::int64_t sample_sequence = -1;  // [-] of the sample used
   Phase phase = Phase::kDisarmed;
-  std::int32_t segment = -1;         // [-] of the program
-  std::int32_t age = 0;              // [-] ticks since the sample was new
-  Wrench total, fixed, dynamic;      // F_Po_I measured; of gravity (the report's static); difference
-  PathPoint<6> motion;               // commanded coordinates about home, rates, accelerations
-  Vec6 due = Vec6::Zero();           // coordinates that the platform should have at this very tick
-  LegMotion legs;                    // commanded
-  Vec6 L_measured = Vec6::Zero();    // [m]
-  Pose measured;                     // about home, from L_measured
-  Vec6 bias = Vec6::Zero();          // [count]
-  Tripped tripped;                   // in this tick
-  Tripped latched;                   // since the start
-  Check cause = Check::kCount;       // the first to latch
-  std::int64_t cause_tick = -1;      // [-]
+  std::int32_t segment = -1;       // [-] of the program
+  std::int32_t age = 0;            // [-] ticks since the sample was new
+  Wrench total, fixed, dynamic;    // F_Po_I measured; of gravity (the report's static); difference
+  PathPoint<6> motion;             // commanded coordinates about home, rates, accelerations
+  Vec6 due = Vec6::Zero();         // coordinates that the platform should have at this very tick
+  LegMotion legs;                  // commanded
+  Vec6 L_measured = Vec6::Zero();  // [m]
+  Pose measured;                   // about home, from L_measured
+  Vec6 bias = Vec6::Zero();        // [count]
+  Tripped tripped;                 // in this tick
+  Tripped latched;                 // since the start
+  Check cause = Check::kCount;     // the first to latch
+  std::int64_t cause_tick = -1;    // [-]
   LegCommand command;
 };
 
@@ -151,13 +151,13 @@ class TestPlatform {
   Calibration calibration_;
   TickState state_;
   Transform X_IP_measured_;
-  bool legs_solved_ = false;         // forward kinematics found the pose of this sample
-  int fresh_ticks_ = 0;              // [-] consecutive ticks with a new sample and no rival
+  bool legs_solved_ = false;  // forward kinematics found the pose of this sample
+  int fresh_ticks_ = 0;       // [-] consecutive ticks with a new sample and no rival
   bool start_requested_ = false;
-  std::int64_t n_ = 0;               // [-] ticks of the segment (or the return) so far
-  std::int64_t steps_ = 0;           // [-] periods that it lasts
+  std::int64_t n_ = 0;      // [-] ticks of the segment (or the return) so far
+  std::int64_t steps_ = 0;  // [-] periods that it lasts
   Vec6 segment_start_ = Vec6::Zero();
-  Quintic<6> brake_, move_;          // one after the other
+  Quintic<6> brake_, move_;  // one after the other
 };
 
 }  // namespace ves

@@ -25,7 +25,7 @@ using Trajectory = std::array<Axis, 6>;
 
 /// Coordinates n periods after the start at `initial`; a ramp reaches its end at n = steps, (C.8),
 /// (C.9), and stays; a sine is (C.10). Ramps are evaluated, not accumulated, so they end exactly.
-PathPoint<6> trajectoryGeneration(const Trajectory& trajectory, const Vec6& initial,
-                                  std::int64_t n, std::int64_t steps, double period) noexcept;
+PathPoint<6> trajectoryGeneration(const Trajectory& trajectory, const Vec6& initial, std::int64_t n,
+                                  std::int64_t steps, double period) noexcept;
 
 }  // namespace ves

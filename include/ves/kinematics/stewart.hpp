@@ -70,7 +70,8 @@ inline constexpr int kForwardIterations = 20;
 ///
 /// The step is a twist applied to the pose, not added to the angles: the distinction the report
 /// draws in (2.26), and what makes the convergence quadratic.
-ForwardSolution forwardPose(const Geometry& geometry, const Vec6& L, const Transform& guess) noexcept;
+ForwardSolution forwardPose(const Geometry& geometry, const Vec6& L,
+                            const Transform& guess) noexcept;
 
 /// Rate (2.24) and acceleration (2.32) of P at the pose X_IP. Where (2.30) to (2.32) print only the
 /// diagonal of the second derivative, the whole of it is used. False when the Jacobian is singular;

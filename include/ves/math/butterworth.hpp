@@ -2,8 +2,8 @@
 //
 // Low-pass Butterworth filters of second and third order for N channels side by side, advanced
 // exactly over steps of any length while the input runs along a straight line. The report's sensor
-// conditioner (two poles, 20 Hz, section 2.2) and Filters 1 to 3 (section 2.4) are analog: they have
-// no sampling period of their own.
+// conditioner (two poles, 20 Hz, section 2.2) and Filters 1 to 3 (section 2.4) are analog: they
+// have no sampling period of their own.
 #pragma once
 
 #include <cmath>
@@ -26,9 +26,7 @@ class Butterworth2 {
 
   explicit Butterworth2(double cutoff) : w_(cutoff) {}  // [rad/s]
 
-  Step prepare(double dt) const noexcept {
-    return {discretise(w_ * w_, M_SQRT2 * w_, dt).Phi, dt};
-  }
+  Step prepare(double dt) const noexcept { return {discretise(w_ * w_, M_SQRT2 * w_, dt).Phi, dt}; }
 
   /// At rest under the constant input u.
   void settle(const Channels& u) noexcept {
@@ -46,17 +44,15 @@ class Butterworth2 {
     y_dot_ = slope + step.Phi(1, 0) * e + step.Phi(1, 1) * e_dot;
     u_ = u;
   }
-  void advance(const Step& step, const Channels& u) noexcept {
-    advance(step, u, Channels::Zero());
-  }
+  void advance(const Step& step, const Channels& u) noexcept { advance(step, u, Channels::Zero()); }
 
   const Channels& output() const noexcept { return y_; }
 
  private:
-  double w_;                                // [rad/s]
-  Channels u_ = Channels::Zero();           // last input
-  Channels y_ = Channels::Zero();           // output
-  Channels y_dot_ = Channels::Zero();       // its rate
+  double w_;                           // [rad/s]
+  Channels u_ = Channels::Zero();      // last input
+  Channels y_ = Channels::Zero();      // output
+  Channels y_dot_ = Channels::Zero();  // its rate
 };
 
 /// w^3 / ((s + w)(s^2 + w s + w^2)).

@@ -28,8 +28,8 @@ using Vec6 = Eigen::Matrix<double, 6, 1>;
 using Mat3 = Eigen::Matrix3d;
 using Mat6 = Eigen::Matrix<double, 6, 6>;
 
-inline constexpr double kDegree = M_PI / 180.0;      // [rad]
-inline constexpr double kMetrePerInch = 0.0254;      // [m]
+inline constexpr double kDegree = M_PI / 180.0;       // [rad]
+inline constexpr double kMetrePerInch = 0.0254;       // [m]
 inline constexpr double kSecondPerNanosecond = 1e-9;  // [s]
 
 /// Pose of a frame in another: rotates, then translates.
@@ -146,11 +146,11 @@ inline Mat3 skew(const Vec3& a) {
 
 /// Motion of a frame in I, everything in inertial axes.
 struct BodyMotion {
-  Transform X;                    // X_IP
-  Vec3 v = Vec3::Zero();          // [m/s] v_IPo_I
-  Vec3 w = Vec3::Zero();          // [rad/s] w_IP_I
-  Vec3 a = Vec3::Zero();          // [m/s^2] a_IPo_I
-  Vec3 alpha = Vec3::Zero();      // [rad/s^2] alpha_IP_I
+  Transform X;                // X_IP
+  Vec3 v = Vec3::Zero();      // [m/s] v_IPo_I
+  Vec3 w = Vec3::Zero();      // [rad/s] w_IP_I
+  Vec3 a = Vec3::Zero();      // [m/s^2] a_IPo_I
+  Vec3 alpha = Vec3::Zero();  // [rad/s^2] alpha_IP_I
 };
 
 }  // namespace ves

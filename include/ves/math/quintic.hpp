@@ -39,9 +39,12 @@ class Quintic {
     const double u = t < 0.0 ? 0.0 : t / T_;
     using Six = Eigen::Matrix<double, 6, 1>;
     point.x = c_ * (Six() << 1.0, u, u * u, u * u * u, u * u * u * u, u * u * u * u * u).finished();
-    point.x_dot = c_ * (Six() << 0.0, 1.0, 2.0 * u, 3.0 * u * u, 4.0 * u * u * u,
-                        5.0 * u * u * u * u).finished() / T_;
-    point.x_ddot = c_ * (Six() << 0.0, 0.0, 2.0, 6.0 * u, 12.0 * u * u, 20.0 * u * u * u).finished() /
+    point.x_dot =
+        c_ *
+        (Six() << 0.0, 1.0, 2.0 * u, 3.0 * u * u, 4.0 * u * u * u, 5.0 * u * u * u * u).finished() /
+        T_;
+    point.x_ddot = c_ *
+                   (Six() << 0.0, 0.0, 2.0, 6.0 * u, 12.0 * u * u, 20.0 * u * u * u).finished() /
                    (T_ * T_);
     return point;
   }

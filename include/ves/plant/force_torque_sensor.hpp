@@ -10,19 +10,17 @@
 namespace ves::plant {
 
 struct ForceTorqueSensorModel {
-  Mat6 S = Mat6::Zero();             // [V/(V N) | V/(V N m)] sensitivity, crosstalk included, (2.4)
-  double excitation = 10.0;          // [V] V_ex
-  Vec6 gain = Vec6::Ones();          // [-] A_i of the conditioner
-  Vec6 bias = Vec6::Zero();          // [V] stray voltage at the converter
-  Vec6 noise = Vec6::Zero();         // [V/sqrt(Hz)] white, at the conditioner's input
-  double cutoff = 0.0;               // [rad/s] of the two-pole Butterworth filter
-  double volts_per_count = 0.0;      // [V/count] K_ad; the report prints 305 mV for 0.305 mV
-  double pressure = 0.0;             // [V] hydraulic pressure, seventh channel
+  Mat6 S = Mat6::Zero();         // [V/(V N) | V/(V N m)] sensitivity, crosstalk included, (2.4)
+  double excitation = 10.0;      // [V] V_ex
+  Vec6 gain = Vec6::Ones();      // [-] A_i of the conditioner
+  Vec6 bias = Vec6::Zero();      // [V] stray voltage at the converter
+  Vec6 noise = Vec6::Zero();     // [V/sqrt(Hz)] white, at the conditioner's input
+  double cutoff = 0.0;           // [rad/s] of the two-pole Butterworth filter
+  double volts_per_count = 0.0;  // [V/count] K_ad; the report prints 305 mV for 0.305 mV
+  double pressure = 0.0;         // [V] hydraulic pressure, seventh channel
 
   /// [count/N | count/(N m)] S_proc of (2.6).
-  Mat6 S_proc() const {
-    return (gain * (excitation / volts_per_count)).asDiagonal() * S;
-  }
+  Mat6 S_proc() const { return (gain * (excitation / volts_per_count)).asDiagonal() * S; }
 };
 
 class ForceTorqueSensor {

@@ -8,8 +8,8 @@
 
 namespace ves::plant {
 
-inline constexpr std::int64_t kTransducerPeriod = 341'000;                 // [ns]
-inline constexpr int kReadingsPerUpdate = 3;                               // [-]
+inline constexpr std::int64_t kTransducerPeriod = 341'000;                             // [ns]
+inline constexpr int kReadingsPerUpdate = 3;                                           // [-]
 inline constexpr std::int64_t kUpdatePeriod = kReadingsPerUpdate * kTransducerPeriod;  // [ns]
 
 struct LegSlaveGains {
@@ -34,9 +34,9 @@ class LegSlave {
   /// True right after the reading that updated the code.
   bool updated() const noexcept { return phase_ == 2; }
 
-  static constexpr std::int32_t kFullScale = 32767;              // [-]
-  static constexpr double kVoltsPerDigit = 10.0 / 32768.0;       // [V]
-  static constexpr double kAmperesPerVolt = 4e-3;                // [A/V] servo-amplifier
+  static constexpr std::int32_t kFullScale = 32767;         // [-]
+  static constexpr double kVoltsPerDigit = 10.0 / 32768.0;  // [V]
+  static constexpr double kAmperesPerVolt = 4e-3;           // [A/V] servo-amplifier
 
   double current() const noexcept { return code_ * kVoltsPerDigit * kAmperesPerVolt; }  // [A]
 

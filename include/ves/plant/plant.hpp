@@ -3,7 +3,8 @@
 // Everything that was metal, on one event schedule:
 //
 //   every 341 us   six Temposonics readings into six LegSlaves
-//   every 1023 us  new valve currents (a LegSlave's second reading), and half a period later, in the
+//   every 1023 us  new valve currents (a LegSlave's second reading), and half a period later, in
+//   the
 //                  middle of the constant current, one look at the mechanics: forward kinematics,
 //                  Newton-Euler on the moving base, force-torque sensor
 //   when asked     a sample, at that very moment
@@ -73,14 +74,14 @@ struct PlantConfig {
 
 /// What nobody but a simulation can know; the controller never reads it.
 struct Truth {
-  std::int64_t time = 0;     // [ns]
-  BodyMotion P;              // platform
-  Pose x;                    // about home
-  Wrench F_Po_I;             // on the platform from all the sensor carries
+  std::int64_t time = 0;  // [ns]
+  BodyMotion P;           // platform
+  Pose x;                 // about home
+  Wrench F_Po_I;          // on the platform from all the sensor carries
   JointState joints;
-  LegMotion legs;            // of the actuators, unfiltered
+  LegMotion legs;               // of the actuators, unfiltered
   Vec6 current = Vec6::Zero();  // [A] valves
-  bool legs_agree = true;    // forward kinematics found a pose
+  bool legs_agree = true;       // forward kinematics found a pose
 };
 
 class Plant {
@@ -93,8 +94,8 @@ class Plant {
   /// that names it.
   void command(const LegCommand& command) noexcept;
 
-  /// Starts a joint motion now. Refused (false) when there is no such joint, a value is not a number
-  /// or the duration not positive.
+  /// Starts a joint motion now. Refused (false) when there is no such joint, a value is not a
+  /// number or the duration not positive.
   bool moveRobot(const RobotMove& move) noexcept;
 
   /// Time passes, up to and including the events at `until` [ns].
@@ -130,13 +131,13 @@ class Plant {
   Butterworth2<kLegs>::Step position_step_;
   Butterworth3<kLegs>::Step rate_step_;
 
-  std::int64_t now_ = 0;              // [ns] actuators are here
-  std::int64_t last_look_ = 0;        // [ns] mechanics and sensor are here
+  std::int64_t now_ = 0;                           // [ns] actuators are here
+  std::int64_t last_look_ = 0;                     // [ns] mechanics and sensor are here
   std::int64_t next_reading_ = kTransducerPeriod;  // [ns]
-  std::int64_t next_look_ = 0;        // [ns]
+  std::int64_t next_look_ = 0;                     // [ns]
   std::int64_t sequence_ = -1;
-  std::int64_t segment_ = -1;         // of the last command
-  std::int64_t segment_start_ = 0;    // [ns]
+  std::int64_t segment_ = -1;               // of the last command
+  std::int64_t segment_start_ = 0;          // [ns]
   std::int64_t next_robot_event_ = kNever;  // [ns]
   std::vector<bool> robot_event_done_;
   struct JointPath {

@@ -33,8 +33,8 @@ struct ReplayResult {
 };
 
 struct ReplayOptions {
-  double speed = 0.0;                 // times real time; 0: as fast as it goes
-  const Experiment* with = nullptr;   // another configuration for the same samples
+  double speed = 0.0;                // times real time; 0: as fast as it goes
+  const Experiment* with = nullptr;  // another configuration for the same samples
 };
 
 /// Called for every replayed tick.

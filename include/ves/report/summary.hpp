@@ -9,8 +9,8 @@
 
 namespace ves {
 
-/// Named numbers, the unit at the end of each name. Errors are where the platform should be at a tick
-/// minus where it is, over the trajectory and admittance segments of the program.
+/// Named numbers, the unit at the end of each name. Errors are where the platform should be at a
+/// tick minus where it is, over the trajectory and admittance segments of the program.
 nlohmann::ordered_json summarise(const Series& series, const RunResult& result);
 
 /// The summary as a person reads it.

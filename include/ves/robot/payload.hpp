@@ -8,11 +8,11 @@ namespace ves {
 /// Everything the force-torque sensor carries (report, figure 2.1): its own top plate, the adapter
 /// plate, the robot.
 struct Payload {
-  Transform X_PS;          // sensor in the platform
-  RigidBody top_plate_S;   // of the sensor
-  Transform X_PR;          // centre of the adapter plate
-  RigidBody adapter_R;     // adapter plate
-  Transform X_RL0;         // robot's base link on the plate
+  Transform X_PS;         // sensor in the platform
+  RigidBody top_plate_S;  // of the sensor
+  Transform X_PR;         // centre of the adapter plate
+  RigidBody adapter_R;    // adapter plate
+  Transform X_RL0;        // robot's base link on the plate
   RobotModel robot;
 
   Transform X_PL0() const { return X_PR * X_RL0; }

@@ -15,7 +15,7 @@ enum class JointType { kRevolute, kPrismatic };
 
 /// Mass, centre and inertia of a rigid body B.
 struct RigidBody {
-  double mass = 0.0;           // [kg]
+  double mass = 0.0;              // [kg]
   Vec3 p_BoBcm_B = Vec3::Zero();  // [m] centre of mass
   Mat3 I_Bcm_B = Mat3::Zero();    // [kg m^2] about the centre of mass
 };
@@ -26,10 +26,10 @@ RigidBody combine(const RigidBody& a_A, const Transform& X_AB, const RigidBody& 
 /// A joint and the link it moves. The link's frame is the joint's frame after the joint's motion.
 struct Link {
   JointType type = JointType::kRevolute;
-  Transform X_parent;            // pose of the joint's frame in the parent link, at joint value 0
-  Vec3 axis = Vec3::UnitZ();     // [-] unit vector, joint frame
-  double lower = 0.0;            // [rad | m] joint range
-  double upper = 0.0;            // [rad | m]
+  Transform X_parent;         // pose of the joint's frame in the parent link, at joint value 0
+  Vec3 axis = Vec3::UnitZ();  // [-] unit vector, joint frame
+  double lower = 0.0;         // [rad | m] joint range
+  double upper = 0.0;         // [rad | m]
   RigidBody body;
 };
 

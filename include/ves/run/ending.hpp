@@ -5,7 +5,8 @@
 
 namespace ves {
 
-/// Decides when a run is over: parked; a while after a stop, so that the hold is seen; or never armed.
+/// Decides when a run is over: parked; a while after a stop, so that the hold is seen; or never
+/// armed.
 class Ending {
  public:
   explicit Ending(std::int64_t period) : period_(period) {}
@@ -14,8 +15,7 @@ class Ending {
     ++result_.ticks;
     result_.phase = state.phase;
     switch (state.phase) {
-      case Phase::kParked:
-        return true;
+      case Phase::kParked: return true;
       case Phase::kStopped:
         result_.cause = state.cause;
         result_.cause_tick = state.cause_tick;

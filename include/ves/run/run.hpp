@@ -15,9 +15,9 @@ namespace ves {
 
 /// How a run ended.
 struct RunResult {
-  std::int64_t ticks = 0;       // [-]
-  double simulated = 0.0;       // [s]
-  double wall = 0.0;            // [s]
+  std::int64_t ticks = 0;  // [-]
+  double simulated = 0.0;  // [s]
+  double wall = 0.0;       // [s]
   Phase phase = Phase::kDisarmed;
   Check cause = Check::kCount;  // of a stop; or why it never armed
   std::int64_t cause_tick = -1;
@@ -42,8 +42,8 @@ struct ProcessOptions {
   std::string log;        // file, empty: none
 };
 
-/// The controller's process. Returns when the program is over, a check has stopped it, or the machine
-/// is silent.
+/// The controller's process. Returns when the program is over, a check has stopped it, or the
+/// machine is silent.
 RunResult runController(const Experiment& experiment, const ProcessOptions& options,
                         const Watch& watch);
 
@@ -53,8 +53,8 @@ void runPlant(const Experiment& experiment, const ProcessOptions& options,
 
 struct LaunchOptions {
   ProcessOptions process;
-  std::filesystem::path programs;   // folder of ves-controller and ves-plant
-  std::filesystem::path scenario;   // resolved experiment file, for both
+  std::filesystem::path programs;  // folder of ves-controller and ves-plant
+  std::filesystem::path scenario;  // resolved experiment file, for both
 };
 
 /// Both as processes; records everything on the bus to options.process.log. `watch` sees the states

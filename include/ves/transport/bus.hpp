@@ -36,7 +36,8 @@ class Bus {
   void publish(const std::string& channel, const experiment_t& message);
 
   /// Every message of a channel (a regular expression), as bytes.
-  using Handler = std::function<void(const std::string& channel, const void* data, std::uint32_t size)>;
+  using Handler =
+      std::function<void(const std::string& channel, const void* data, std::uint32_t size)>;
   void subscribe(const std::string& channel, Handler handler);
 
   /// Hands out all that has arrived.
@@ -113,11 +114,11 @@ class PlantLink {
  private:
   bool mayCommand(const header_t& from, bool engaged) noexcept;
 
-  std::int64_t now_ = 0;          // [ns]
-  Identity master_;               // who has the legs
+  std::int64_t now_ = 0;  // [ns]
+  Identity master_;       // who has the legs
   bool engaged_ = false;
-  std::int64_t heard_ = 0;        // [ns]
-  std::int64_t sequence_ = -2;    // of the master's last command
+  std::int64_t heard_ = 0;      // [ns]
+  std::int64_t sequence_ = -2;  // of the master's last command
   std::optional<std::pair<LegCommand, std::int64_t>> command_;
   std::vector<plant::RobotMove> moves_;
   std::int64_t rejected_ = 0;

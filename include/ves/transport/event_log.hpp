@@ -60,7 +60,8 @@ class LogReader {
   /// Throws InputError when there is no such file.
   explicit LogReader(const std::string& path);
 
-  /// The next event; nothing at the end. Throws InputError, with the byte, where the file is no log.
+  /// The next event; nothing at the end. Throws InputError, with the byte, where the file is no
+  /// log.
   bool next(LogEvent& event);
 
  private:

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Between messages and the structs of the control path. What comes from the wire passes a gate: every
-// value finite and in range, or the message is nobody's.
+// Between messages and the structs of the control path. What comes from the wire passes a gate:
+// every value finite and in range, or the message is nobody's.
 #pragma once
 
 #include <optional>
