@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
@@ -21,6 +22,18 @@ inline constexpr int kTripped = 1;  // a check stopped it, or a comparison faile
 inline constexpr int kBadInput = 2;
 
 inline volatile std::sig_atomic_t stop_requested = 0;
+
+/// A number in [lo, hi]; CLI11's own range lets NaN through.
+inline CLI::Validator inRange(double lo, double hi) {
+  return {[lo, hi](std::string& text) {
+            double x = NAN;
+            const bool number = CLI::detail::lexical_cast(text, x);
+            return number && x >= lo && x <= hi
+                       ? std::string()
+                       : fmt::format("'{}', want a number in [{}, {}]", text, lo, hi);
+          },
+          fmt::format("in [{}, {}]", lo, hi)};
+}
 
 /// Ctrl-C and SIGTERM ask for a gentle end.
 inline void catchSignals() {
@@ -70,7 +83,7 @@ inline int run(CLI::App& cli, int argc, char** argv, const std::function<int()>&
   }
   try {
     return body();
-  } catch (const InputError& error) {
+  } catch (const std::exception& error) {
     fmt::print(stderr, "{}: {}\n", cli.get_name(), error.what());
     return kBadInput;
   }

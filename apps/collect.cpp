@@ -21,9 +21,10 @@ int main(int argc, char** argv) {
                  "columns, or beginnings of their names: z_ fx_dynamic; all by default");
   cli.add_flag("--list", list, "only the names of the columns");
   cli.add_option("--rate", rate, "[Hz] rows per second; every tick by default")
-      ->check(CLI::Range(1e-6, 1e6));
-  cli.add_option("--from", from, "[s] since the first tick")->check(CLI::Range(0.0, 1e9));
-  cli.add_option("--duration", duration, "[s]; to the end by default")->check(CLI::Range(0.0, 1e9));
+      ->check(app::inRange(1e-6, 1e6));
+  cli.add_option("--from", from, "[s] since the first tick")->check(app::inRange(0.0, 1e9));
+  cli.add_option("--duration", duration, "[s]; to the end by default")
+      ->check(app::inRange(0.0, 1e9));
   cli.add_option("--out", out, "file; standard output by default");
   return app::run(cli, argc, argv, [&] {
     const Series series = readSeries(log);

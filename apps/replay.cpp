@@ -17,7 +17,7 @@ int main(int argc, char** argv) {
   cli.add_flag("--check", check,
                "compare every command and state bit for bit; differences: status 1");
   cli.add_option("--speed", options.speed, "times real time; as fast as it goes by default")
-      ->check(CLI::Range(1e-3, 1e6));
+      ->check(app::inRange(1e-3, 1e6));
   cli.add_option("--with", with, "what would the controller have done with this scenario instead?");
   return app::run(cli, argc, argv, [&] {
     std::optional<Experiment> other;

@@ -7,9 +7,12 @@
 #include <fstream>
 
 #include "app.hpp"
+#include "ves/realtime/realtime.hpp"
 #include "ves/report/outcome.hpp"
 
 namespace ves::app {
+
+inline constexpr int kRecorderPriority = 10;  // [-] SCHED_FIFO, below both processes
 
 struct RunnerOptions : Options {
   std::string out;
@@ -51,6 +54,8 @@ inline int runExperiment(RunnerOptions& options) {
       options.private_bus = true;
     }
     if (options.private_bus) enterPrivateBus();
+    // Asked here first, so that a refusal is said once.
+    if (options.process.realtime) claimRealtime(kRecorderPriority, true);
     LaunchOptions launch{options.process,
                          std::filesystem::read_symlink("/proc/self/exe").parent_path(), resolved};
     launch.process.log = log.string();

@@ -81,6 +81,25 @@ TEST(Config, EveryMachineNumberIsTheReportsOrTagged) {
   check(loadDocument(fs::path(test::configDir()) / "ves.yaml"), "", false);
 }
 
+TEST(Config, AnotherBaseReplacesTheMachinesOwn) {
+  const auto base = [](const std::string& value) {
+    return loadExperiment(scenarios() / "free_decay.yaml", {"base=" + value}).controller.admittance;
+  };
+  const ModalModel modes = base(
+      "{modes: {frequency_hz: [0.5, 1], damping_ratio: [0.02, 0.02], shapes: [[1, 0], [0, 1], [0, "
+      "0], "
+      "[0, 0], [0, 0], [0, 0]]}}");
+  EXPECT_EQ(modes.Phi.cols(), 2);
+  EXPECT_NEAR(modes.stiffness(0), M_PI * M_PI, 1e-12);
+  EXPECT_NEAR(modes.damping(1, 1), 2 * 0.02 * 2 * M_PI, 1e-12);
+  const std::string full =
+      "[[2, 1, 0, 0, 0, 0], [1, 2, 0, 0, 0, 0], [0, 0, 1, 0, 0, 0], [0, 0, 0, 1, 0, 0], [0, 0, 0, "
+      "0, 1, "
+      "0], [0, 0, 0, 0, 0, 1]]";
+  EXPECT_EQ(base("{mass: " + full + ", damping: " + full + ", stiffness: " + full + "}").Phi.cols(),
+            6);
+}
+
 // --- Bad input: one line with file, line, key and what is allowed --------------------------------
 
 struct Bad {
@@ -152,6 +171,7 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"unknown_joint", "puma_tilt",
             "program=[{move: {}, robot: [{at_s: 0, duration_s: 1, joint: elbow, to_deg_or_m: 1}]}]",
             "joint: 'elbow', want one of joint_1, joint_2"},
+        Bad{"name_is_a_path", "z_sine", "name=../up", "name: want letters"},
         Bad{"schema", "z_sine", "schema=2", "schema: '2'"},
         Bad{"override_without_value", "z_sine", "seed", "--set seed: want key.path=value"},
         Bad{"tag", "z_sine", "seed=!guess 4", "tag !guess"}),

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <kdl/chainfksolverpos_recursive.hpp>
 #include <limits>
 #include <random>
 #include <unsupported/Eigen/MatrixFunctions>
@@ -18,8 +19,8 @@ namespace {
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kT = 0.01;  // [s]
 
-Experiment experiment(const std::string& name) {
-  return loadExperiment(test::configDir() + "/scenarios/" + name + ".yaml");
+Experiment experiment(const std::string& name, const std::vector<std::string>& set = {}) {
+  return loadExperiment(test::configDir() + "/scenarios/" + name + ".yaml", set);
 }
 
 Mat6 randomDefinite(unsigned seed, double scale) {
@@ -78,28 +79,39 @@ TEST(Calibration, GivesMeanAndStandardDeviation) {
   EXPECT_NEAR(calibration.deviation()(0), 0.0, 1e-12);
 }
 
-TEST(GravityCompensation, EqualsNewtonEulerAtRest) {
-  for (const char* name : {"puma_tilt", "doss_on_table_4_1"}) {
-    const Experiment e = experiment(name);
+TEST(GravityCompensation, IsTheSumOfWeightsAtKdlsPositions) {
+  for (const auto& [scenario, urdf] :
+       {std::pair{"puma_tilt", "puma560"}, {"doss_on_table_4_1", "doss"}}) {
+    const Experiment e = experiment(scenario);
     const Payload& load = e.controller.payload;
-    const Vec3 g_I = e.controller.gravity;
+    const KDL::Chain chain = test::kdlChain(urdf);
+    KDL::ChainFkSolverPos_recursive solver(chain);
+    const Vec3 g_I(0.0, 0.0, -9.81);
     std::mt19937 random(4);
     std::uniform_real_distribution<double> u(-3.0, 3.0);
     for (const Pose& x : test::poses(100)) {
-      JointState s;
-      for (int i = 0; i < load.robot.joints; ++i) s.q(i) = u(random);
-      BodyMotion P;
-      P.X = {rotation(x.rpy), x.p};
-      const auto part = [&](const Transform& X_PB, const Wrench& on_body) {
-        return rotate(P.X.R, transfer(X_PB, Wrench{} - on_body));
+      const Mat3 R_IP = rotation(x.rpy);
+      JointVector q = JointVector::Zero();
+      KDL::JntArray kdl_q(chain.getNrOfJoints());
+      for (unsigned i = 0; i < chain.getNrOfJoints(); ++i) q(i) = kdl_q(i) = u(random);
+      Vec3 f = Vec3::Zero(), n = Vec3::Zero();
+      const auto add = [&](double mass, const Vec3& p_PC_P) {
+        f += mass * g_I;
+        n += (R_IP * p_PC_P).cross(mass * g_I);
       };
-      const Wrench oracle =
-          part(load.X_PL0(),
-               newtonEuler(load.robot, s, feltMotion(P, load.X_PL0(), g_I)).F_L0o_L0) +
-          part(load.X_PR, inertialWrench(load.adapter_R, feltMotion(P, load.X_PR, g_I))) +
-          part(load.X_PS, inertialWrench(load.top_plate_S, feltMotion(P, load.X_PS, g_I)));
-      const Wrench out = gravityCompensation(load, s.q, P.X.R, g_I);
-      ASSERT_LT((out - oracle).stacked().norm(), 1e-9);
+      const Vec3 p_PL0 = load.X_PR.p + load.X_RL0.p;  // plates and mount are not turned
+      add(load.robot.base.mass, p_PL0 + load.robot.base.p_BoBcm_B);
+      for (unsigned i = 0; i < chain.getNrOfSegments(); ++i) {
+        KDL::Frame frame;
+        solver.JntToCart(kdl_q, frame, static_cast<int>(i) + 1);
+        const KDL::RigidBodyInertia& body = chain.getSegment(i).getInertia();
+        const KDL::Vector c = frame * body.getCOG();
+        add(body.getMass(), p_PL0 + Vec3(c.x(), c.y(), c.z()));
+      }
+      add(16.0, load.X_PR.p);
+      add(5.0, load.X_PS.p + Vec3(0.0, 0.0, 0.031));  // the top plate, above the sensor's origin
+      const Wrench out = gravityCompensation(load, q, R_IP, g_I);
+      ASSERT_LT((out.f - f).norm() + (out.n - n).norm(), 1e-9);
     }
   }
 }
@@ -429,10 +441,11 @@ TEST(TrippedSet, FirstIsTheHighestPriority) {
 /// A controller on a machine that goes exactly where it is told, at once.
 class Bench {
  public:
-  explicit Bench(const std::string& scenario) : e_(experiment(scenario)), platform_(e_.controller) {
+  explicit Bench(const std::string& scenario, const std::vector<std::string>& set = {},
+                 const Pose& found = {{0.01, -0.02, -0.05}, {0.02, 0.0, 0.01}})
+      : e_(experiment(scenario, set)), platform_(e_.controller) {
     const Geometry& g = e_.controller.geometry;
-    in_.sample.legs = legCounts(
-        e_.controller.legs, legLengths(g, g.fromHome({{0.01, -0.02, -0.05}, {0.02, 0.0, 0.01}})));
+    in_.sample.legs = legCounts(e_.controller.legs, legLengths(g, g.fromHome(found)));
     in_.sample.q = e_.plant.initial_joints;
     in_.sample.switches = kAllSwitchesClosed;
     in_.request = Request::kStart;
@@ -564,6 +577,52 @@ INSTANTIATE_TEST_SUITE_P(
         Fault{"legs_without_a_pose", Check::kForwardKinematics,
               [](TickInput& in) { in.sample.legs = {0, 16383, 0, 16383, 0, 16383}; }},
         Fault{"second_controller", Check::kRival, [](TickInput& in) { in.rival = true; }}),
+    [](const auto& test) { return std::string(test.param.name); });
+
+struct Crossing {
+  const char* name;
+  Check check;
+  const char* scenario;
+  const char* limit;  // that the program crosses, and no other
+  const char* program = nullptr;
+};
+std::ostream& operator<<(std::ostream& out, const Crossing& crossing) {
+  return out << crossing.name;
+}
+
+class Limits : public testing::TestWithParam<Crossing> {};
+
+TEST_P(Limits, StopTheProgramThatCrossesThem) {
+  const Crossing& c = GetParam();
+  std::vector<std::string> set = {c.limit};
+  if (c.program) set.push_back(c.program);
+  Bench bench(c.scenario, set, Pose{});
+  LegCounts last{};
+  const TickState* state = nullptr;
+  for (int i = 0; i < 3000; ++i) {
+    state = &bench.tick();
+    if (state->phase == Phase::kStopped || state->phase == Phase::kParked) break;
+    last = state->command.counts;
+  }
+  ASSERT_EQ(state->phase, Phase::kStopped);
+  EXPECT_EQ(state->cause, c.check) << name(state->cause);
+  EXPECT_EQ(state->tripped.bits(), 1u << static_cast<unsigned>(c.check));  // it alone
+  EXPECT_EQ(state->command.counts, last);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Checks, Limits,
+    testing::Values(
+        Crossing{"motion", Check::kMotionLimits, "z_sine", "safety.translation_m=0.1"},
+        Crossing{"actuator_long", Check::kActuatorLimits, "z_sine", "safety.leg_max_m=1.6"},
+        Crossing{"actuator_short", Check::kActuatorLimits, "z_sine", "safety.leg_min_m=1.45"},
+        Crossing{"joint", Check::kJointLimits, "alpha_sine", "safety.joint_cone_deg=10"},
+        // Legs hardly approach each other in one coordinate: 0.1529 m at 30 degrees, 0.1531 m at
+        // home.
+        Crossing{"collide", Check::kCollide, "alpha_sine", "safety.leg_clearance_m=0.1530",
+                 "program=[{trajectory: {duration_s: 4, alpha: {ramp: {to_deg: 29.9}}}}]"},
+        Crossing{"velocity", Check::kVelocity, "z_sine", "safety.leg_velocity_m_per_s=0.3"},
+        Crossing{"flow", Check::kFlow, "z_sine", "safety.flow_l_per_s=0.3"}),
     [](const auto& test) { return std::string(test.param.name); });
 
 TEST(TestPlatform, SilenceTripsAfterTheAllowedAge) {

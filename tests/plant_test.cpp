@@ -259,10 +259,38 @@ TEST(Plant, IgnoresCommandsThatAreNotEngaged) {
   for (std::size_t i = 0; i < kLegs; ++i) EXPECT_NEAR(after[i], before[i] + 500, 1.0);
 }
 
-TEST(Plant, SensorFeelsTheLegsMoveTheRobot) {
-  // Momentum balance of the whole payload while the platform swings: the wrench on the platform is
-  // minus the rate of momentum, less gravity. Checked through the true wrench against Newton-Euler
-  // by parts, with the plates on their own.
+TEST(Plant, TrueRatesAreTheDerivativesOfTheTruePose) {
+  // Looked at every 50 us while the legs follow steps: rates by differences of the pose,
+  // accelerations by their integral (they jump with every new current).
+  const Experiment e = experiment("z_sine");
+  Plant plant(e.plant);
+  LegCommand command;
+  command.engaged = true;
+  command.counts = plant.sample().legs;
+  for (std::size_t i = 0; i < kLegs; ++i) command.counts[i] += static_cast<int>(60 + 30 * i);
+  plant.command(command);
+  const double dt = 50e-6;
+  Truth before = plant.truth();
+  Vec3 dv = Vec3::Zero(), dw = Vec3::Zero();
+  double fastest = 0.0;
+  for (int k = 1; k <= 1200; ++k) {
+    plant.advance(k * 50'000LL);
+    plant.sample();
+    const Truth& now = plant.truth();
+    ASSERT_LT(((now.P.X.p - before.P.X.p) / dt - 0.5 * (now.P.v + before.P.v)).norm(), 4e-4);
+    const Mat3 W = (now.P.X.R * before.P.X.R.transpose() - Mat3::Identity()) / dt;
+    ASSERT_LT((Vec3(W(2, 1), W(0, 2), W(1, 0)) - 0.5 * (now.P.w + before.P.w)).norm(), 8e-4);
+    dv += 0.5 * dt * (now.P.a + before.P.a);
+    dw += 0.5 * dt * (now.P.alpha + before.P.alpha);
+    fastest = std::max(fastest, now.P.v.norm());
+    ASSERT_LT((now.P.v - dv).norm() + (now.P.w - dw).norm(), 0.03 * fastest + 1e-3);
+    before = now;
+  }
+  EXPECT_GT(fastest, 0.02);
+}
+
+TEST(Plant, PlatesCountedIntoTheRobotsBaseWeighTheSame) {
+  // Once as the plant does it, once part by part.
   Experiment e = experiment("puma_on_table_4_1");
   Plant plant(e.plant);
   LegCommand command;

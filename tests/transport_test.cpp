@@ -230,8 +230,18 @@ TEST_F(PrivateBus, ControllerKeepsTheNewestSampleOfTheNewestPlant) {
   machine.publish(channel::kSample, broken);
   settle(machine, controller, [&] { return link.rejected() == 3; });
   EXPECT_EQ(link.sample().sequence, 5);
+  link.takeRival();
   send(0, 200);  // the plant was started anew
   settle(machine, controller, [&] { return link.sample().sequence == 0; });
+  EXPECT_FALSE(link.takeRival());
+
+  leg_command_t engaged = toMessage(LegCommand{}, header({9, 9}, 0, 0));
+  engaged.engaged = 1;
+  link.send(engaged);
+  send(77, 300);  // another machine, while we have the legs of this one
+  settle(machine, controller, [&] { return link.rejected() == 4; });
+  EXPECT_EQ(link.sample().sequence, 0);
+  EXPECT_TRUE(link.takeRival());
 }
 
 TEST_F(PrivateBus, OneControllerHasTheLegs) {

@@ -89,7 +89,7 @@ class Converter {
 
 /// `over` wins; maps merge key by key, everything else is replaced.
 void merge(Value& base, Value over) {
-  if (base.kind != Value::Kind::kMap || over.kind != Value::Kind::kMap) {
+  if (over.whole || base.kind != Value::Kind::kMap || over.kind != Value::Kind::kMap) {
     base = std::move(over);
     return;
   }
@@ -135,6 +135,7 @@ void resolve(Value& value, const std::filesystem::path& directory, int depth) {
     base.file = value.file;
     merge(base, std::move(value));
     value = std::move(base);
+    value.whole = true;
   }
 }
 
@@ -239,6 +240,7 @@ void override(Value& document, const std::string& assignment) {
   if (equals == std::string::npos || equals == 0)
     throw InputError(fmt::format("--set {}: want key.path=value", assignment));
   Value leaf = parse(assignment.substr(equals + 1), "--set " + assignment);
+  leaf.whole = true;
   std::string path = assignment.substr(0, equals);
   for (;;) {
     const std::size_t dot = path.rfind('.');

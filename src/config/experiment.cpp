@@ -349,6 +349,10 @@ Experiment build(const Value& document) {
   Section root(document, "");
   root.integer("schema", 1, 1);
   out.name = root.text("name");
+  if (out.name.empty() ||
+      out.name.find_first_not_of(
+          "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-") != std::string::npos)
+    root.fail("name", "want letters, digits, _ and -; folders are named after it");
   out.description = root.text("description");
   out.plant.seed = static_cast<std::uint32_t>(root.integer("seed", 0, UINT32_MAX));
 

@@ -20,7 +20,7 @@ std::string_view name(Check check) noexcept {
     case Check::kCollide: return "collide";
     case Check::kVelocity: return "velocity";
     case Check::kFlow: return "flow limits";
-    case Check::kRival: return "second controller";
+    case Check::kRival: return "second controller or machine";
     case Check::kCount: break;
   }
   return "none";

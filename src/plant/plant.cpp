@@ -61,6 +61,7 @@ void Plant::command(const LegCommand& command) noexcept {
   if (!command.engaged) return;
   reference_ = command.counts;
   if (command.segment == segment_) return;
+  if (command.segment < segment_) robot_event_done_.assign(robot_event_done_.size(), false);
   segment_ = command.segment;
   segment_start_ = now_;
   planRobotEvent();

@@ -156,6 +156,7 @@ nlohmann::ordered_json summarise(const Series& series, const RunResult& result) 
   out["ticks"] = result.ticks;
   out["simulated_s"] = result.simulated;
   out["wall_s"] = result.wall;
+  out["messages_lost"] = result.lost;
   out["real_time_factor"] = result.wall > 0.0 ? result.simulated / result.wall : 0.0;
   addTracking(series, out);
   addWrench(series, out);
@@ -172,6 +173,14 @@ std::string table(const nlohmann::ordered_json& s) {
       "  ended {} after {:.2f} s ({} ticks), {:.4g} x real time, {} substitute values\n",
       s["ended"].get<std::string>(), number("simulated_s"), s["ticks"].get<std::int64_t>(),
       number("real_time_factor"), s["substitute_values"].get<int>());
+  if (s["messages_lost"].get<std::int64_t>() > 0)
+    out += fmt::format("  {} messages or log events were lost: is the disk full?\n",
+                       s["messages_lost"].get<std::int64_t>());
+  if (s["ended"] == name(Phase::kDisarmed))
+    out +=
+        fmt::format("  never armed: {}\n", s["first_cause"] == name(Check::kCount)
+                                               ? std::string("no stream of new samples long enough")
+                                               : s["first_cause"].get<std::string>());
   if (!s["trips"].empty())
     out += fmt::format("  stopped in tick {} by: {}\n", s["first_cause_tick"].get<std::int64_t>(),
                        s["first_cause"].get<std::string>());
@@ -187,8 +196,11 @@ std::string table(const nlohmann::ordered_json& s) {
     const auto cell = [&](const std::string& what) {
       return fmt::format("{:.3f} {:<3}", number(c + what + unit) * scale, shown);
     };
-    out += fmt::format("  {:<8}{:>16}{:>16}{:>16}{:>7.1f} ms\n", c, cell("_peak_to_peak_"),
-                       cell("_error_max_"), cell("_error_rms_"), number(c + "_lag_s") * 1e3);
+    // A coordinate that is only held somewhere else has no rate to lag behind.
+    const double lag = number(c + "_lag_s");
+    out += fmt::format("  {:<8}{:>16}{:>16}{:>16}{:>10}\n", c, cell("_peak_to_peak_"),
+                       cell("_error_max_"), cell("_error_rms_"),
+                       std::isnan(lag) ? "-" : fmt::format("{:.1f} ms", lag * 1e3));
   }
   if (s.contains("z_error_max_extending_m"))
     out += fmt::format("  z error  {:.1f} mm extending, {:.1f} mm retracting\n",

@@ -80,12 +80,17 @@ RunResult runProcesses(const Experiment& experiment, const LaunchOptions& option
     log->write(channel::kExperiment, describe(experiment, {}, 0), wallClock());
   }
   RunResult result;
+  std::int64_t source = 0;  // of our controller: the first to be heard
   bus.subscribe("VES_(SAMPLE|LEG_COMMAND|STATE|TRUTH|TIMING|ROBOT|OPERATOR)",
                 [&](const std::string& channel, const void* data, std::uint32_t size) {
                   if (log) log->write(channel, data, size, wallClock());
                   if (channel != channel::kState) return;
                   const auto state = decode<state_t>(data, size);
                   if (!state) return;
+                  if (source == 0) source = state->header.source;
+                  if (state->header.source != source) return;
+                  if (source == 0) source = state->header.source;
+                  if (state->header.source != source) return;
                   ++result.ticks;
                   result.phase = static_cast<Phase>(state->phase);
                   result.cause = result.phase == Phase::kDisarmed
@@ -121,6 +126,10 @@ RunResult runProcesses(const Experiment& experiment, const LaunchOptions& option
       static_cast<double>(result.ticks * experiment.controller.period) * kSecondPerNanosecond;
   if (controller.status() != 0 && controller.status() != 1)
     throw InputError(fmt::format("ves-controller ended with status {}", controller.status()));
+  // The last state may be lost on the way; the exit status is not.
+  if (controller.status() == 0) result.phase = Phase::kParked;
+  if (controller.status() == 1 && result.good()) result.phase = Phase::kStopped;
+  result.lost = bus.failed() + (log ? log->lost() : 0);
   return result;
 }
 

@@ -21,7 +21,7 @@ RunResult runLockstep(const Experiment& experiment, LogWriter* log, const Watch&
   const std::int64_t period = experiment.controller.period;
   TestPlatform platform(experiment.controller);
   plant::Plant plant(experiment.plant);
-  Ending ending(period);
+  Ending ending(experiment.controller);
 
   const auto record = [&](const std::string& channel, const auto& message) {
     if (log) log->write(channel, message, plant.time());
@@ -47,7 +47,9 @@ RunResult runLockstep(const Experiment& experiment, LogWriter* log, const Watch&
     plant.command(state.command);
     plant.advance((in.tick + 1) * period);
   }
-  return ending.result(monotonicNow() - start);
+  RunResult result = ending.result(monotonicNow() - start);
+  if (log) result.lost = log->lost();
+  return result;
 }
 
 }  // namespace ves

@@ -29,7 +29,7 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
   Bus bus(options.url);
   ControllerLink link(bus, self);
   TestPlatform platform(experiment.controller);
-  Ending ending(experiment.controller.period);
+  Ending ending(experiment.controller);
 
   std::unique_ptr<LogWriter> log;
   if (!options.log.empty()) {
@@ -137,20 +137,26 @@ void runPlant(const Experiment& experiment, const ProcessOptions& options,
   };
 
   if (options.lockstep) {
-    std::int64_t answered = -2;
+    std::int64_t answered = -2;  // tick
+    std::int64_t start = 0;      // [ns] plant time of the controller's tick 0
     sample_t last;
     while (!stop()) {
       bus.wait(100);
+      link.setTime(monotonicNow());
       for (const plant::RobotMove& move : link.takeMoves()) plant.moveRobot(move);
       const auto command = link.takeCommand();
       if (!command) continue;
       const auto& [legs, tick] = *command;
+      if (tick == -1 && answered >= 0) {  // another controller begins
+        answered = -2;
+        start = plant.time();
+      }
       if (tick == answered) {
         bus.publish(channel::kSample, last);
       } else if (tick == answered + 1) {
         if (tick >= 0) {
           plant.command(legs);
-          plant.advance((tick + 1) * period);
+          plant.advance(start + (tick + 1) * period);
         }
         last = publish(plant.time(), tick);
         answered = tick;

@@ -107,10 +107,10 @@ ControllerLink::ControllerLink(Bus& bus, const Identity& self) : bus_(bus), self
   bus.subscribe(channel::kSample, [this](const std::string&, const void* data, std::uint32_t size) {
     const auto message = decode<sample_t>(data, size);
     const auto sample = message ? fromMessage(*message) : std::nullopt;
-    // A plant that was started anew counts from zero; an older one is a ghost.
-    const bool renewed = message && message->header.epoch > plant_.epoch;
     const bool same =
-        message && message->header.epoch == plant_.epoch && message->header.source == plant_.source;
+        message && message->header.source == plant_.source && message->header.epoch == plant_.epoch;
+    const bool renewed = message && !same && !engaged_ && message->header.epoch > plant_.epoch;
+    if (sample && !same && !renewed) rival_ = true;
     if (!sample || !(renewed || (same && sample->sequence >= sample_.sequence))) {
       ++rejected_;
       return;
@@ -140,6 +140,7 @@ ControllerLink::ControllerLink(Bus& bus, const Identity& self) : bus_(bus), self
 }
 
 void ControllerLink::send(const leg_command_t& command) noexcept {
+  engaged_ = command.engaged != 0;
   bus_.publish(channel::kLegCommand, command);
 }
 
@@ -171,6 +172,7 @@ bool PlantLink::mayCommand(const header_t& from, bool engaged) noexcept {
     // Others wait until the master lets go or falls silent. A controller that is not engaged asks
     // for nothing, and takes nothing over from one that is.
     if (engaged_ && now_ - heard_ < kSilence) return false;
+    if (from.epoch < master_.epoch) return false;  // a ghost: a log played, a process left behind
     master_ = {from.source, from.epoch};
     sequence_ = -2;
   }

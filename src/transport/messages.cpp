@@ -114,6 +114,28 @@ truth_t toMessage(const plant::Truth& truth, const header_t& header) noexcept {
   return m;
 }
 
+template <>
+std::optional<experiment_t> decode<experiment_t>(const void* data, std::int64_t size) {
+  constexpr std::int64_t kFixed = 8 + 32;  // [B] fingerprint and header_t
+  constexpr int kStrings = 4;              // name, hash, version, resolved
+  const auto* bytes = static_cast<const std::uint8_t*>(data);
+  if (size < kFixed || size > INT32_MAX) return {};
+  std::int64_t at = kFixed;
+  for (int i = 0; i < kStrings; ++i) {
+    if (size - at < 4) return {};
+    const std::int64_t length = static_cast<std::int32_t>(
+        static_cast<std::uint32_t>(bytes[at]) << 24 |
+        static_cast<std::uint32_t>(bytes[at + 1]) << 16 |
+        static_cast<std::uint32_t>(bytes[at + 2]) << 8 | static_cast<std::uint32_t>(bytes[at + 3]));
+    at += 4;
+    if (length < 1 || length > size - at || bytes[at + length - 1] != 0) return {};
+    at += length;
+  }
+  experiment_t message;
+  if (at != size || message.decode(data, 0, static_cast<int>(size)) != size) return {};
+  return message;
+}
+
 std::optional<Sample> fromMessage(const sample_t& m) noexcept {
   Sample s;
   s.sequence = m.header.sequence;

@@ -26,7 +26,7 @@ enum class Check : std::uint32_t {
   kCollide,
   kVelocity,
   kFlow,
-  kRival,  // somebody else commands the legs
+  kRival,  // another controller or machine is on the bus
   kCount
 };
 

@@ -88,7 +88,7 @@ struct TickInput {
   std::int64_t tick = 0;  // [-] counts controller periods, missed ones included
   Sample sample;          // the newest
   Request request = Request::kNone;
-  bool rival = false;  // another controller was heard since the last tick
+  bool rival = false;  // another controller or machine was heard since the last tick
 };
 
 /// Everything one tick knew and decided.

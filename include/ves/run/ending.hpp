@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
+
 #include "ves/run/run.hpp"
 
 namespace ves {
@@ -9,7 +11,9 @@ namespace ves {
 /// armed.
 class Ending {
  public:
-  explicit Ending(std::int64_t period) : period_(period) {}
+  explicit Ending(const ControllerConfig& config)
+      : period_(config.period),
+        patience_(std::max(kGiveUp, 3 * config.arming_samples * config.period)) {}
 
   bool reached(const TickState& state) noexcept {
     ++result_.ticks;
@@ -23,7 +27,7 @@ class Ending {
       case Phase::kDisarmed:
         result_.cause = state.tripped.first();
         result_.cause_tick = state.tick;
-        return ++disarmed_ > ticks(kGiveUp);
+        return ++disarmed_ > ticks(patience_);
       default:
         result_.cause = Check::kCount;
         result_.cause_tick = -1;
@@ -40,11 +44,12 @@ class Ending {
 
  private:
   static constexpr std::int64_t kSeeTheHold = 1'000'000'000;  // [ns]
-  static constexpr std::int64_t kGiveUp = 5'000'000'000;      // [ns] disarmed
+  static constexpr std::int64_t kGiveUp = 5'000'000'000;      // [ns] disarmed, at least
 
   std::int64_t ticks(std::int64_t ns) const noexcept { return ns / period_; }
 
-  std::int64_t period_;  // [ns]
+  std::int64_t period_;    // [ns]
+  std::int64_t patience_;  // [ns]
   std::int64_t disarmed_ = 0;
   RunResult result_;
 };

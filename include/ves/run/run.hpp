@@ -21,6 +21,7 @@ struct RunResult {
   Phase phase = Phase::kDisarmed;
   Check cause = Check::kCount;  // of a stop; or why it never armed
   std::int64_t cause_tick = -1;
+  std::int64_t lost = 0;  // [-] log events and messages that could not be written or sent
 
   bool good() const { return phase == Phase::kParked; }
 };

@@ -67,7 +67,10 @@ bool busWorks(const std::string& url);
 /// multicast: nothing leaks out or in. Call before any thread starts. Throws InputError.
 void enterPrivateBus();
 
-/// The controller's side: the newest sample, the operator's wish, whether somebody else commands.
+/// The controller's side: the newest sample, the operator's wish, whether somebody else is there.
+///
+/// A machine that was started anew takes the place of the old one while nothing is engaged. From
+/// then on the machine is the machine: samples of another are not let in and count as a rival.
 class ControllerLink {
  public:
   ControllerLink(Bus& bus, const Identity& self);
@@ -88,6 +91,7 @@ class ControllerLink {
   std::int64_t answers_ = -2;
   std::int64_t sample_time_ = 0;
   Identity plant_;
+  bool engaged_ = false;
   Request request_ = Request::kNone;
   bool rival_ = false;
   std::int64_t rejected_ = 0;

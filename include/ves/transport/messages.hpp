@@ -50,4 +50,8 @@ std::optional<Message> decode(const void* data, std::int64_t size) {
   return message;
 }
 
+/// The one message with strings: lcm-gen's own decoder trusts their lengths.
+template <>
+std::optional<experiment_t> decode<experiment_t>(const void* data, std::int64_t size);
+
 }  // namespace ves
