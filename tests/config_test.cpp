@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "support/refusal.hpp"
 #include "support/robots.hpp"
 #include "ves/config/experiment.hpp"
 
@@ -16,14 +17,7 @@ namespace fs = std::filesystem;
 
 fs::path scenarios() { return fs::path(test::configDir()) / "scenarios"; }
 
-std::string refusal(const std::function<void()>& read) {
-  try {
-    read();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
-}
+using test::refusal;
 
 TEST(Config, EveryScenarioLoads) {
   int count = 0;

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 
+#include "support/refusal.hpp"
 #include "ves/replay/replay.hpp"
 #include "ves/run/run.hpp"
 #include "ves/transport/channels.hpp"
@@ -43,12 +44,7 @@ class Replay : public testing::Test {
                      event.time_us * 1000);
   }
   static std::string refusal(const std::string& log) {
-    try {
-      replay(log, {}, nullptr);
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return "";
+    return test::refusal([&] { replay(log, {}, nullptr); });
   }
   std::string log_, edited_;
 };

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <random>
 
+#include "support/refusal.hpp"
 #include "ves/config/document.hpp"
 #include "ves/transport/bus.hpp"
 #include "ves/transport/channels.hpp"
@@ -16,14 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string refusal(const std::function<void()>& read) {
-  try {
-    read();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
-}
+using test::refusal;
 
 Sample goodSample() {
   Sample s;
