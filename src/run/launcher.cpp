@@ -81,6 +81,7 @@ RunResult runProcesses(const Experiment& experiment, const LaunchOptions& option
   }
   RunResult result;
   std::int64_t source = 0;  // of our controller: the first to be heard
+  std::int64_t heard = 0;   // [-] of its states
   bus.subscribe("VES_(SAMPLE|LEG_COMMAND|STATE|TRUTH|TIMING|ROBOT|OPERATOR)",
                 [&](const std::string& channel, const void* data, std::uint32_t size) {
                   if (log) log->write(channel, data, size, wallClock());
@@ -89,9 +90,8 @@ RunResult runProcesses(const Experiment& experiment, const LaunchOptions& option
                   if (!state) return;
                   if (source == 0) source = state->header.source;
                   if (state->header.source != source) return;
-                  if (source == 0) source = state->header.source;
-                  if (state->header.source != source) return;
-                  ++result.ticks;
+                  ++heard;
+                  result.ticks = state->count + 1;
                   result.phase = static_cast<Phase>(state->phase);
                   result.cause = result.phase == Phase::kDisarmed
                                      ? Tripped(static_cast<std::uint32_t>(state->tripped)).first()
@@ -129,7 +129,7 @@ RunResult runProcesses(const Experiment& experiment, const LaunchOptions& option
   // The last state may be lost on the way; the exit status is not.
   if (controller.status() == 0) result.phase = Phase::kParked;
   if (controller.status() == 1 && result.good()) result.phase = Phase::kStopped;
-  result.lost = bus.failed() + (log ? log->lost() : 0);
+  result.lost = bus.failed() + (log ? log->lost() + result.ticks - heard : 0);
   return result;
 }
 
