@@ -38,7 +38,7 @@ std::string_view name(Phase phase) noexcept;
 
 enum class SegmentKind : std::int32_t {
   kCalibration,  // hold, and take the bias of the sensor
-  kMove,         // gently to a pose, at rest at both ends
+  kMove,         // brakes if it must, then gently to rest at a pose
   kTrajectory,
   kAdmittance  // from wherever the platform is, as the model's state at rest
 };
