@@ -47,17 +47,17 @@ int main(int argc, char** argv) {
       if (!file) throw InputError(fmt::format("--out {}: cannot be written", out));
     }
     std::ostream& to = out.empty() ? std::cout : file;
-    const char* between = list ? "\n" : ",";
-    for (std::size_t i = 0; i < chosen.size(); ++i) to << (i ? between : "") << chosen[i].name;
-    to << "\n";
-    double next = from;
-    for (const Row& row : series.rows) {
-      // Half a nanosecond: times are whole nanoseconds in seconds.
-      if (list || row.t < next - 0.5e-9 || row.t > from + duration) continue;
-      if (rate > 0.0) next += 1.0 / rate;
-      for (std::size_t i = 0; i < chosen.size(); ++i)
-        to << (i ? "," : "") << fmt::format("{}", chosen[i].value(row));
-      to << "\n";
+    if (list) {
+      for (const Column& column : chosen) to << column.name << "\n";
+    } else {
+      to << csvHeader(chosen) << "\n";
+      double next = from;
+      for (const Row& row : series.rows) {
+        // Half a nanosecond: times are whole nanoseconds in seconds.
+        if (row.t < next - 0.5e-9 || row.t > from + duration) continue;
+        if (rate > 0.0) next += 1.0 / rate;
+        to << csvRow(chosen, row) << "\n";
+      }
     }
     to.flush();
     if (!to) throw InputError(fmt::format("--out {}: cannot be written", out));

@@ -5,18 +5,13 @@
 #include <time.h>
 
 #include <cstring>
-#include <deque>
 #include <memory>
-#include <unordered_map>
 
 #include "ves/realtime/realtime.hpp"
 #include "ves/transport/channels.hpp"
 
 namespace ves {
 namespace {
-
-// How far apart a sample and the tick that used it, or a command and its state, may stand in a log.
-constexpr std::size_t kKept = 4096;  // [-] messages
 
 /// Calls f(name, index or -1, value) for every number of a message but its header.
 template <typename F>
@@ -84,27 +79,6 @@ std::optional<Difference> compare(const Message& recorded, const Message& replay
   return first;
 }
 
-/// The last messages by their sequence.
-template <typename T>
-class Recent {
- public:
-  void put(std::int64_t sequence, const T& value) {
-    if (!by_sequence_.insert_or_assign(sequence, value).second) return;
-    order_.push_back(sequence);
-    if (order_.size() <= kKept) return;
-    by_sequence_.erase(order_.front());
-    order_.pop_front();
-  }
-  const T* find(std::int64_t sequence) const {
-    const auto at = by_sequence_.find(sequence);
-    return at == by_sequence_.end() ? nullptr : &at->second;
-  }
-
- private:
-  std::unordered_map<std::int64_t, T> by_sequence_;
-  std::deque<std::int64_t> order_;
-};
-
 class Replayer {
  public:
   Replayer(const std::string& log, const ReplayOptions& options, const ReplayWatch& watch)
@@ -134,9 +108,7 @@ class Replayer {
  private:
   template <typename Message>
   Message decoded() const {
-    const auto message = event_.as<Message>();
-    if (!message) fail(fmt::format("not a {} of this version", Message::getTypeName()));
-    return *message;
+    return event_.require<Message>(log_);
   }
   [[noreturn]] void fail(const std::string& what) const {
     throw InputError(fmt::format("{}: byte {}: {}", log_, event_.offset, what));

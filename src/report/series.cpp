@@ -5,60 +5,37 @@
 #include <fmt/os.h>
 
 #include <cmath>
-#include <deque>
-#include <unordered_map>
+#include <iterator>
 
 #include "ves/transport/channels.hpp"
 #include "ves/transport/event_log.hpp"
 
 namespace ves {
-namespace {
-
-// A tick uses one of the newest samples; older truths can go.
-constexpr std::size_t kTruthsKept = 4096;  // [-]
-
-}  // namespace
-
 Series readSeries(const std::string& log) {
   Series series;
   bool configured = false;
-  std::unordered_map<std::int64_t, truth_t> truths;  // by sequence of the sample
-  std::deque<std::int64_t> order;
+  Recent<truth_t> truths;
   LogReader reader(log);
   LogEvent event;
   while (reader.next(event)) {
-    const auto fail = [&](const char* what) {
-      throw InputError(fmt::format("{}: byte {}: {}", log, event.offset, what));
-    };
     if (event.channel == channel::kExperiment) {
       if (configured) continue;
-      const auto message = event.as<experiment_t>();
-      if (!message) fail("not an experiment_t of this version");
-      series.experiment = parseExperiment(message->resolved, log + ":configuration");
-      series.version = message->version;
+      const auto message = event.require<experiment_t>(log);
+      series.experiment = parseExperiment(message.resolved, log + ":configuration");
+      series.version = message.version;
       configured = true;
     } else if (event.channel == channel::kTruth) {
-      const auto truth = event.as<truth_t>();
-      if (!truth) fail("not a truth_t of this version");
-      truths[truth->header.sequence] = *truth;
-      order.push_back(truth->header.sequence);
-      if (order.size() > kTruthsKept) {
-        truths.erase(order.front());
-        order.pop_front();
-      }
+      const auto truth = event.require<truth_t>(log);
+      truths.put(truth.header.sequence, truth);
     } else if (event.channel == channel::kState) {
-      const auto state = event.as<state_t>();
-      if (!state) fail("not a state_t of this version");
       Row row;
-      row.state = *state;
-      const auto truth = truths.find(state->sample_sequence);
-      row.has_truth = truth != truths.end();
-      if (row.has_truth) row.truth = truth->second;
+      row.state = event.require<state_t>(log);
+      const truth_t* truth = truths.find(row.state.sample_sequence);
+      row.has_truth = truth != nullptr;
+      if (truth) row.truth = *truth;
       series.rows.push_back(row);
     } else if (event.channel == channel::kTiming && !series.rows.empty()) {
-      const auto timing = event.as<timing_t>();
-      if (!timing) fail("not a timing_t of this version");
-      series.rows.back().timing = *timing;
+      series.rows.back().timing = event.require<timing_t>(log);
       series.rows.back().has_timing = true;
     }
   }
@@ -129,17 +106,25 @@ std::vector<Column> columns(const Experiment& experiment) {
   return out;
 }
 
+std::string csvHeader(const std::vector<Column>& columns) {
+  std::string line;
+  for (const Column& column : columns) line += (line.empty() ? "" : ",") + column.name;
+  return line;
+}
+
+std::string csvRow(const std::vector<Column>& columns, const Row& row) {
+  std::string line;
+  for (const Column& column : columns)
+    fmt::format_to(std::back_inserter(line), "{}{}", line.empty() ? "" : ",", column.value(row));
+  return line;
+}
+
 void writeCsv(const Series& series, const std::string& file) {
   try {
     auto out = fmt::output_file(file);
     const std::vector<Column> all = columns(series.experiment);
-    for (std::size_t i = 0; i < all.size(); ++i) out.print("{}{}", i ? "," : "", all[i].name);
-    out.print("\n");
-    for (const Row& row : series.rows) {
-      for (std::size_t i = 0; i < all.size(); ++i)
-        out.print("{}{}", i ? "," : "", all[i].value(row));
-      out.print("\n");
-    }
+    out.print("{}\n", csvHeader(all));
+    for (const Row& row : series.rows) out.print("{}\n", csvRow(all, row));
   } catch (const std::system_error& error) {
     throw InputError(fmt::format("{}: cannot be written: {}", file, error.what()));
   }

@@ -35,12 +35,12 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
   if (!options.log.empty()) {
     log = std::make_unique<LogWriter>(options.log);
     log->write(channel::kExperiment, describe(experiment, self, 0), 0);
-    bus.subscribe("VES_(SAMPLE|TRUTH)", [&log](const std::string& channel, const void* data,
+    bus.subscribe("VES_(SAMPLE|TRUTH)", [&log](const std::string& from, const void* data,
                                                std::uint32_t size) {
-      const auto any = decode<sample_t>(data, size);
-      const auto truth = decode<truth_t>(data, size);
-      const std::int64_t time = any ? any->header.time_ns : truth ? truth->header.time_ns : 0;
-      log->write(channel, data, size, time);
+      const auto timeOf = [](const auto& message) { return message ? message->header.time_ns : 0; };
+      log->write(from, data, size,
+                 from == channel::kSample ? timeOf(decode<sample_t>(data, size))
+                                          : timeOf(decode<truth_t>(data, size)));
     });
   }
   bus.publish(channel::kExperiment, describe(experiment, self, monotonicNow()));

@@ -17,8 +17,8 @@ namespace {
 // Ten samples wait at each tick in the worst case; a stalled controller must still find the newest.
 constexpr int kQueue = 4096;  // [-] messages
 
-/// The url, if LCM may have it: it would print, or go on with part of an address.
-const std::string& checked(const std::string& url) {
+/// Refuses what LCM would print about, or take part of an address from.
+void check(const std::string& url) {
   unsigned a, b, c, d, port;
   int end = 0;
   const int read =
@@ -28,7 +28,6 @@ const std::string& checked(const std::string& url) {
       port > 65535 || !(rest.empty() || rest.rfind("?ttl=", 0) == 0))
     throw InputError(fmt::format(
         "--url {}: want udpm://MULTICAST-ADDRESS:PORT[?ttl=N], for example {}", url, kDefaultUrl));
-  return url;
 }
 
 /// True when the kernel knows where multicast should go; LCM prints a page when it does not.
@@ -52,8 +51,9 @@ bool hasRoute() {
 }
 
 const std::string& reachable(const std::string& url) {
-  if (!hasRoute()) refuse(checked(url));
-  return checked(url);
+  check(url);
+  if (!hasRoute()) refuse(url);
+  return url;
 }
 
 /// One message to ourselves, within two seconds.
@@ -98,8 +98,9 @@ void Bus::drain() noexcept {
 bool Bus::wait(int milliseconds) noexcept { return lcm_.handleTimeout(milliseconds) > 0; }
 
 bool busWorks(const std::string& url) {
-  if (!hasRoute()) return checked(url), false;
-  lcm::LCM lcm(checked(url));
+  check(url);
+  if (!hasRoute()) return false;
+  lcm::LCM lcm(url);
   return lcm.good() && echoes(lcm);
 }
 

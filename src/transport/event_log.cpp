@@ -42,6 +42,10 @@ void LogWriter::write(const std::string& channel, const void* data, std::int64_t
   if (file_->writeEvent(&event) != 0) ++lost_;
 }
 
+void LogEvent::refuse(const std::string& log, const char* type) const {
+  throw InputError(fmt::format("{}: byte {}: not a {} of this version", log, offset, type));
+}
+
 LogReader::LogReader(const std::string& path) : path_(path) {
   std::error_code error;
   if (!std::filesystem::exists(path, error)) throw InputError(path + ": no such file");

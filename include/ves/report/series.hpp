@@ -38,6 +38,10 @@ struct Column {
 };
 std::vector<Column> columns(const Experiment& experiment);
 
+/// Lines of a table, without their end.
+std::string csvHeader(const std::vector<Column>& columns);
+std::string csvRow(const std::vector<Column>& columns, const Row& row);
+
 /// Throws InputError when the file cannot be written.
 void writeCsv(const Series& series, const std::string& file);
 

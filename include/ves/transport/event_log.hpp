@@ -5,10 +5,12 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <fstream>
 #include <memory>
 #include <optional>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "ves/transport/messages.hpp"
@@ -53,6 +55,37 @@ struct LogEvent {
   std::optional<Message> as() const {
     return decode<Message>(data.data(), static_cast<std::int64_t>(data.size()));
   }
+  /// The same, or InputError: `log` is the file's name.
+  template <typename Message>
+  Message require(const std::string& log) const {
+    if (auto message = as<Message>()) return *std::move(message);
+    refuse(log, Message::getTypeName());
+  }
+
+ private:
+  [[noreturn]] void refuse(const std::string& log, const char* type) const;
+};
+
+/// The last messages of a log by their sequence: what a tick refers to stands shortly before it.
+template <typename T>
+class Recent {
+ public:
+  void put(std::int64_t sequence, const T& value) {
+    if (!by_sequence_.insert_or_assign(sequence, value).second) return;
+    order_.push_back(sequence);
+    if (order_.size() <= kKept) return;
+    by_sequence_.erase(order_.front());
+    order_.pop_front();
+  }
+  const T* find(std::int64_t sequence) const {
+    const auto at = by_sequence_.find(sequence);
+    return at == by_sequence_.end() ? nullptr : &at->second;
+  }
+
+ private:
+  static constexpr std::size_t kKept = 4096;  // [-] messages
+  std::unordered_map<std::int64_t, T> by_sequence_;
+  std::deque<std::int64_t> order_;
 };
 
 class LogReader {
