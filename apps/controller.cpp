@@ -12,13 +12,14 @@ int main(int argc, char** argv) {
   app::Options options;
   options.addExperiment(cli);
   options.addBus(cli);
+  cli.add_flag("--start", options.process.start, "run the scenario's program at once");
   cli.add_option("--log", options.process.log, "record samples, states and commands (lockstep)");
   return app::run(cli, argc, argv, [&] {
     if (options.private_bus) enterPrivateBus();
     app::catchSignals();
     const Experiment experiment = options.load();
     const RunResult result = runController(experiment, options.process, [](const TickState&) {
-      return app::stop_requested ? Request::kStop : Request::kNone;
+      return app::stop_requested ? Order{Request::kStop, {}, {}} : Order();
     });
     if (result.good()) return app::kDone;
     if (result.phase == Phase::kDisarmed)

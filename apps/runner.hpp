@@ -46,7 +46,7 @@ inline int runExperiment(RunnerOptions& options) {
       double x[6];
       Vec6::Map(x) = state.motion.x;
       progress.show(state.phase, state.segment, state.tick, x);
-      return stop_requested ? Request::kStop : Request::kNone;
+      return stop_requested ? Order{Request::kStop, {}, {}} : Order();
     });
   } else {
     if (!options.private_bus && !busWorks(options.process.url)) {

@@ -126,7 +126,7 @@ TEST_F(ClosedLoop, GravityCompensationLeavesQuantisationAndFilterLag) {
   plant::Plant plant(e.plant);
   SecondOrderFilter filter;  // of the force that accelerates the payload: real, not a residual
   TickInput in;
-  in.request = Request::kStart;
+  in.order.request = Request::kStart;
   double still = 0.0, moving = 0.0, allowed = 0.0;
   std::int64_t still_since = 0;
   for (; !platform.done(); ++in.tick) {
@@ -190,7 +190,7 @@ TEST_F(ClosedLoop, ReachesTheBaseItEmulatesUnderAConstantForce) {
       ++ticks;
       x = state.motion.x;
     }
-    return Request::kNone;
+    return Order();
   });
   EXPECT_EQ(ticks, 2500);
   EXPECT_NEAR(x(2), -5.0 * 9.81 / 4000.0, 2e-4);
@@ -233,9 +233,10 @@ TEST_F(ClosedLoop, SwitchStopsTheRunAndLeavesItsName) {
 
 TEST_F(ClosedLoop, StopRequestEndsParked) {
   int ticks = 0;
-  const RunResult result = runLockstep(
-      experiment("puma_on_table_4_1"), nullptr,
-      [&](const TickState&) { return ++ticks == 900 ? Request::kStop : Request::kNone; });
+  const RunResult result =
+      runLockstep(experiment("puma_on_table_4_1"), nullptr, [&](const TickState&) {
+        return ++ticks == 900 ? Order{Request::kStop, {}, {}} : Order();
+      });
   EXPECT_TRUE(result.good());
   EXPECT_LT(result.ticks, 1300);
 }

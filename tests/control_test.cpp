@@ -57,8 +57,8 @@ TEST(ForceMeasurement, UndoesSensorAndFrames) {  // (2.6) forward, (C.1) back
   }
 }
 
-TEST(Calibration, GivesMeanAndStandardDeviation) {
-  Calibration calibration;
+TEST(ChannelStatistics, GivesMeanAndStandardDeviation) {
+  ChannelStatistics calibration;
   std::mt19937 random(2);
   std::uniform_int_distribution<int> u(-1000, 1000);
   std::vector<double> x;
@@ -448,13 +448,13 @@ class Bench {
     in_.sample.legs = legCounts(e_.controller.legs, legLengths(g, g.fromHome(found)));
     in_.sample.q = e_.plant.initial_joints;
     in_.sample.switches = kAllSwitchesClosed;
-    in_.request = Request::kStart;
+    in_.order.request = Request::kStart;
   }
   const TickState& tick() {
     ++in_.sample.sequence;
     const TickState& state = platform_.tick(in_);
     ++in_.tick;
-    in_.request = Request::kNone;
+    in_.order.request = Request::kNone;
     if (state.command.engaged) in_.sample.legs = state.command.counts;
     return state;
   }
@@ -523,7 +523,7 @@ TEST(TestPlatform, StopRequestComesHomeWithoutAJump) {
   for (int i = 0; i < 180; ++i) bench.tick();  // in full swing
   const double rate = bench.tick().motion.x_dot(2);
   EXPECT_GT(std::abs(rate), 0.2);
-  bench.in().request = Request::kStop;
+  bench.in().order.request = Request::kStop;
   const Vec6 before = bench.tick().motion.x_dot;
   EXPECT_NEAR(before(2), rate, 0.05);
   EXPECT_EQ(bench.tickUntil(Phase::kParked).phase, Phase::kParked);

@@ -30,7 +30,7 @@ TEST_P(NoHeap, FromArmingToParking) {
     TestPlatform platform(e.controller);
     plant::Plant plant(e.plant);
     TickInput in;
-    in.request = Request::kStart;
+    in.order.request = Request::kStart;
     const TickState* state = nullptr;
     test::MallocGuard guard;
     for (; in.tick < 6000 && !platform.done(); ++in.tick) {
@@ -50,7 +50,7 @@ TEST_P(NoHeap, ThroughATripAndTheHold) {
   TestPlatform platform(e.controller);
   plant::Plant plant(e.plant);
   TickInput in;
-  in.request = Request::kStart;
+  in.order.request = Request::kStart;
   test::MallocGuard guard;
   for (; in.tick < 600; ++in.tick) {
     in.sample = plant.sample();

@@ -176,7 +176,7 @@ TEST(Sensor, SettledReadingIsSprocTimesWrench) {  // (2.6)
   sensor.settle(W);
   const Vec6 expected =
       e.plant.sensor.S_proc() * W.stacked() + e.plant.sensor.bias / e.plant.sensor.volts_per_count;
-  const AdcCounts adc = sensor.convert();
+  const AdcCounts adc = sensor.convert(0.0);
   for (int i = 0; i < 6; ++i) EXPECT_NEAR(adc[static_cast<std::size_t>(i)], expected(i), 0.5);
 }
 
@@ -184,8 +184,8 @@ TEST(Sensor, ConverterSaturates) {
   Experiment e = experiment("free_decay");
   ForceTorqueSensor sensor(e.plant.sensor, Noise(1));
   sensor.settle({Vec3(1e6, -1e6, 0.0), Vec3::Zero()});
-  EXPECT_EQ(sensor.convert()[0], 32767);
-  EXPECT_EQ(sensor.convert()[1], -32768);
+  EXPECT_EQ(sensor.convert(0.0)[0], 32767);
+  EXPECT_EQ(sensor.convert(0.0)[1], -32768);
 }
 
 TEST(Sensor, NoiseIsAsFigure41) {
@@ -202,7 +202,7 @@ TEST(Sensor, NoiseIsAsFigure41) {
   const int n = 20000;
   for (int k = 0; k < n; ++k) {
     for (int i = 0; i < 10; ++i) sensor.advance(step, {});
-    const Wrench W = sensorWrench(e.controller.sensor, bias, sensor.convert());
+    const Wrench W = sensorWrench(e.controller.sensor, bias, sensor.convert(0.0));
     sum2 += W.stacked().cwiseAbs2() / n;
     if (k < 100) largest = largest.cwiseMax(W.stacked().cwiseAbs());
   }

@@ -237,7 +237,8 @@ TEST_F(Programs, LcmLoggerBesideARunReplaysToo) {
     Child plant({dir + "plant", "z_sine"});
     while (sequence < 10 && bus.wait(5000)) {
     }
-    Child controller({dir + "controller", "z_sine", "--set", kPatience, "--set", kShortProgram});
+    Child controller(
+        {dir + "controller", "--start", "z_sine", "--set", kPatience, "--set", kShortProgram});
     EXPECT_EQ(controller.wait(), 0);
     plant.signal(SIGTERM);
     EXPECT_EQ(plant.wait(), 0);
@@ -268,11 +269,11 @@ TEST_F(Programs, SecondControllerRefusesToArmAndTheFirstGoesOn) {
   });
   const std::string dir = std::string(VES_TEST_APP_DIR) + "/ves-";
   Child plant({dir + "plant", "puma_on_table_4_1"});
-  Child first({dir + "controller", "puma_on_table_4_1", "--set", kPatience});
+  Child first({dir + "controller", "--start", "puma_on_table_4_1", "--set", kPatience});
   while (engaged < 50 && bus.wait(10'000)) {
   }
   ASSERT_GE(engaged, 50);
-  Child second({dir + "controller", "puma_on_table_4_1", "--set", kPatience});
+  Child second({dir + "controller", "--start", "puma_on_table_4_1", "--set", kPatience});
   // It gives up after five seconds disarmed; listen meanwhile.
   while (second.running()) bus.wait(100);
   EXPECT_EQ(second.wait(), 1);

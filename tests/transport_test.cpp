@@ -75,9 +75,30 @@ TEST(Gate, LetsNothingOutOfRangeIn) {
   EXPECT_TRUE(fromMessage(move));
   move.target = NAN;
   EXPECT_FALSE(fromMessage(move));
-  operator_t wish{};
-  wish.request = 3;
-  EXPECT_FALSE(fromMessage(wish));
+  const auto order_with = [](auto change) {
+    Order order;
+    order.request = Request::kRun;
+    order.segment.duration = 3.0;
+    order.segment.trajectory[2] = {AxisMotion::kSine, 0.0, 0.2, 0.5};
+    operator_t m = toMessage(order, 9, header({1, 2}, 7, 0));
+    change(m);
+    return fromMessage(m);
+  };
+  const auto order = order_with([](operator_t&) {});
+  ASSERT_TRUE(order);
+  EXPECT_EQ(order->id.source, 1);
+  EXPECT_EQ(order->id.sequence, 7);
+  EXPECT_EQ(order->segment.trajectory[2].amplitude, 0.2);
+  EXPECT_EQ(order->segment.trajectory[2].motion, AxisMotion::kSine);
+  for (const auto change : std::initializer_list<void (*)(operator_t&)>{
+           [](operator_t& m) { m.request = 0; }, [](operator_t& m) { m.request = 8; },
+           [](operator_t& m) { m.kind = 5; }, [](operator_t& m) { m.kind = -1; },
+           [](operator_t& m) { m.duration = 0.0; }, [](operator_t& m) { m.duration = NAN; },
+           [](operator_t& m) { m.interval = -1.0; }, [](operator_t& m) { m.target[3] = INFINITY; },
+           [](operator_t& m) { m.motion[5] = 3; }, [](operator_t& m) { m.final[0] = 1e9; },
+           [](operator_t& m) { m.amplitude[1] = NAN; }, [](operator_t& m) { m.frequency[1] = -1; },
+           [](operator_t& m) { m.header.sequence = -1; }})
+    EXPECT_FALSE(order_with(change));
 }
 
 TEST(Decode, TakesExactlyOneMessage) {

@@ -107,6 +107,7 @@ Legs readLegs(Section s) {
 
 struct Sensor {
   plant::ForceTorqueSensorModel model;
+  plant::Climate climate;
   Transform X_PS;
   RigidBody top_plate_S;
 };
@@ -124,6 +125,14 @@ Sensor readSensor(Section s) {
   m.cutoff = 2.0 * M_PI * s.number("cutoff_hz", 1e-3, 1e5);
   m.volts_per_count = s.number("volts_per_count", kTiny, 1.0);
   m.pressure = s.number("pressure_v", -10.0, 10.0);
+  m.drift = s.vector("drift_v_per_c", 6, -1.0, 1.0);
+  Section climate = s.section("temperature");
+  constexpr double kHour = 3600.0;
+  out.climate.mean = climate.number("mean_c", -50.0, 100.0);
+  out.climate.swing = climate.number("swing_c", 0.0, 50.0);
+  out.climate.period = climate.number("period_h", 1e-3, 1e5) * kHour;
+  out.climate.rising = climate.number("rising_h", -1e5, 1e5) * kHour;
+  climate.finish();
   if (!(std::abs(m.S_proc().determinant()) > 0.0) || !m.S_proc().inverse().allFinite())
     s.fail("sensitivity_uv_per_v", "is singular, want a matrix that has an inverse");
   out.X_PS = {Vec3(1.0, -1.0, -1.0).asDiagonal().toDenseMatrix(),  // 180 degrees about x
@@ -255,8 +264,8 @@ class ProgramReader {
 
  private:
   void readSegment(Section& item, Segment& segment) {
-    const std::string kind =
-        item.onlyKey({"calibration", "move", "trajectory", "admittance"}, {"robot", "switches"});
+    const std::string kind = item.onlyKey(
+        {"calibration", "move", "trajectory", "admittance", "watch"}, {"robot", "switches"});
     Section s = item.section(kind);
     if (kind == "calibration") {
       segment.kind = SegmentKind::kCalibration;
@@ -272,6 +281,10 @@ class ProgramReader {
         if (s.has(coordinate))
           segment.trajectory[static_cast<std::size_t>(i)] = readAxis(s.section(coordinate), i);
       }
+    } else if (kind == "watch") {
+      segment.kind = SegmentKind::kWatch;
+      segment.duration = s.number("duration_s", 0.01, 1e6);
+      segment.interval = s.number("interval_s", 1.0, 1e6);
     } else {
       segment.kind = SegmentKind::kAdmittance;
       segment.duration = s.number("duration_s", 0.01, 1e6);
@@ -368,6 +381,12 @@ Experiment build(const Value& document) {
   c.gentle_rotation_braking =
       controller.number("gentle_rotation_braking_deg_per_s2", 1e-1, 1e3) * kDegree;
   c.arming_samples = static_cast<int>(controller.integer("arming_samples", 1, 10'000));
+  c.tare_ramp = controller.number("tare_ramp_s", 0.01, 100.0);
+  Section still = controller.section("still");
+  c.stillness.leg_counts = static_cast<int>(still.integer("leg_counts", 0, 1000));
+  c.stillness.joint = still.number("joint_rad_or_m", 0.0, 1.0);
+  c.stillness.deviation = still.number("deviation_counts", kTiny, 1e4);
+  still.finish();
   controller.finish();
 
   c.geometry = readGeometry(root.section("platform"));
@@ -403,6 +422,7 @@ Experiment build(const Value& document) {
   p.filters = legs.filters;
   p.filter_cutoff = legs.filter_cutoff;
   p.sensor = sensor.model;
+  p.climate = sensor.climate;
   p.payload = c.payload;
   p.gravity = c.gravity;
   const Vec6 L = legLengths(p.geometry, p.geometry.fromHome(p.initial_pose));

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/control/force_measurement.hpp"
 
+#include <cmath>
+
 namespace ves {
 namespace {
 
@@ -23,17 +25,83 @@ Wrench forceMeasurement(const ForceSensor& sensor, const Vec6& bias, const AdcCo
   return rotate(R_IP, F_Po_P);
 }
 
-void Calibration::add(const AdcCounts& adc, const Vec6& load) noexcept {
+void ChannelStatistics::add(const AdcCounts& adc, const Vec6& load) noexcept {
   // Welford: no sum of squares to cancel.
   const Vec6 x = wrenchCounts(adc) - load;
   const Vec6 before = x - mean_;
   mean_ += before / ++n_;
   m2_ += before.cwiseProduct(x - mean_);
+
+  batch_sum_ += x;
+  if (n_ % kBatchSize != 0) return;
+  const Vec6 batch = batch_sum_ / kBatchSize;
+  batch_sum_.setZero();
+  const Vec6 batch_before = batch - batch_mean_;
+  batch_mean_ += batch_before / (n_ / kBatchSize);
+  batch_m2_ += batch_before.cwiseProduct(batch - batch_mean_);
 }
 
-Vec6 Calibration::deviation() const noexcept {
+Vec6 ChannelStatistics::deviation() const noexcept {
   if (n_ < 2) return Vec6::Zero();
   return (m2_ / (n_ - 1)).cwiseSqrt();
+}
+
+Vec6 ChannelStatistics::standardError() const noexcept {
+  const int batches = n_ / kBatchSize;
+  if (batches < 2) return Vec6::Zero();
+  return (batch_m2_ / ((batches - 1) * batches)).cwiseSqrt();
+}
+
+void Calibration::begin() noexcept {
+  const StillnessLimits limits = limits_;
+  *this = Calibration(limits);
+  status_ = Status::kTaking;
+}
+
+void Calibration::add(const Sample& sample, const Vec6& load) noexcept {
+  if (status_ != Status::kTaking) return;
+  ++samples_;
+  if (!has_first_) {
+    first_ = sample;
+    has_first_ = true;
+  }
+  if (!moved(sample)) statistics_.add(sample.adc, load);
+  if (statistics_.complete()) {
+    Eigen::Index worst = 0;
+    const double most = statistics_.deviation().maxCoeff(&worst);
+    if (most <= limits_.deviation) {
+      status_ = Status::kDone;
+      return;
+    }
+    restart(Unrest::kChannel, static_cast<int>(worst), most);
+  }
+  if (samples_ >= kPatience) status_ = Status::kRefused;
+}
+
+bool Calibration::moved(const Sample& sample) noexcept {
+  for (std::size_t i = 0; i < kLegs; ++i) {
+    const int change = std::abs(sample.legs[i] - first_.legs[i]);
+    if (change > limits_.leg_counts) {
+      restart(Unrest::kLeg, static_cast<int>(i), change);
+      return true;
+    }
+  }
+  for (int i = 0; i < kMaxJoints; ++i) {
+    const double change = std::abs(sample.q(i) - first_.q(i));
+    if (!(change <= limits_.joint)) {
+      restart(Unrest::kJoint, i, change);
+      return true;
+    }
+  }
+  return false;
+}
+
+void Calibration::restart(Unrest what, int index, double amount) noexcept {
+  unrest_ = what;
+  unrest_index_ = index;
+  unrest_amount_ = amount;
+  statistics_.reset();
+  has_first_ = false;
 }
 
 }  // namespace ves

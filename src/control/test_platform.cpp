@@ -29,22 +29,13 @@ std::string_view name(Phase phase) noexcept {
   return "unknown";
 }
 
-std::string_view name(SegmentKind kind) noexcept {
-  switch (kind) {
-    case SegmentKind::kCalibration: return "calibration";
-    case SegmentKind::kMove: return "move";
-    case SegmentKind::kTrajectory: return "trajectory";
-    case SegmentKind::kAdmittance: return "admittance";
-  }
-  return "unknown";
-}
-
 TestPlatform::TestPlatform(const ControllerConfig& config)
     : config_(config),
       period_(static_cast<double>(config.period) * kSecondPerNanosecond),
       joint_axes_(config.geometry),
       admittance_(config.admittance, period_),
       S_proc_(config.sensor.C_proc.inverse()),
+      calibration_(config.stillness),
       X_IP_measured_(config.geometry.fromHome({})) {
   state_.bias = config.bias;
 }
@@ -52,7 +43,8 @@ TestPlatform::TestPlatform(const ControllerConfig& config)
 const TickState& TestPlatform::tick(const TickInput& in) noexcept {
   readSample(in);
   measureWrench(in.sample);  // force measurement, gravity compensation
-  choosePhase(in.request);
+  state_.refusal = obey(in.order);
+  choosePhase();
 
   // Admittance model or trajectory generation, then inverse kinematics.
   const PathPoint<6> next = nextMotion(in.sample);
@@ -70,6 +62,8 @@ const TickState& TestPlatform::tick(const TickInput& in) noexcept {
     state_.command.segment = state_.segment;
     if (legs.L.allFinite()) state_.command.counts = legCounts(config_.legs, legs.L);
   }
+  state_.kind = state_.phase == Phase::kRunning ? segment_.kind : SegmentKind::kCount;
+  state_.idle = idleTicks();
   return state_;
 }
 
@@ -93,32 +87,90 @@ void TestPlatform::measureWrench(const Sample& sample) noexcept {
   // The measured attitude: the commanded one leads it by the servo's lag, and the difference would
   // pass as a wrench of the robot's weight.
   const Mat3& R_IP = X_IP_measured_.R;
+  tare(sample);
   state_.total = forceMeasurement(config_.sensor, state_.bias, sample.adc, R_IP);
   state_.fixed = gravityCompensation(config_.payload, sample.q, R_IP, config_.gravity);
   state_.dynamic = state_.total - state_.fixed;
 }
 
-void TestPlatform::choosePhase(Request request) noexcept {
-  if (request == Request::kStart) start_requested_ = true;
-  if (request == Request::kStop) start_requested_ = false;
+Refusal TestPlatform::obey(const Order& order) noexcept {
+  const Phase phase = state_.phase;
+  const bool ours =
+      phase == Phase::kArmed || phase == Phase::kRunning || phase == Phase::kReturning;
+  switch (order.request) {
+    case Request::kNone:
+    case Request::kCount: return Refusal::kNone;
+    case Request::kArm:
+    case Request::kStart:
+      if (phase == Phase::kDisarmed) {
+        wish_ = order.request;
+        attended_ = order.request == Request::kArm;
+        return Refusal::kNone;
+      }
+      if (order.request == Request::kArm) return ours ? Refusal::kArmed : Refusal::kNotArmed;
+      if (phase != Phase::kArmed) return ours ? Refusal::kBusy : Refusal::kNotArmed;
+      beginProgram(0);
+      return Refusal::kNone;
+    case Request::kStop:
+      wish_ = Request::kNone;
+      if (phase == Phase::kArmed || phase == Phase::kRunning) beginReturn();
+      attended_ = false;
+      return Refusal::kNone;
+    case Request::kRun:
+      if (!ours) return Refusal::kNotArmed;
+      if (phase != Phase::kArmed) return Refusal::kBusy;
+      begin(order.segment);
+      return Refusal::kNone;
+    case Request::kHold:
+      if (!ours) return Refusal::kNotArmed;
+      if (phase != Phase::kArmed) hold();
+      attended_ = true;
+      return Refusal::kNone;
+    case Request::kTare:
+      if (!ours) return Refusal::kNotArmed;
+      if (state_.kind == SegmentKind::kCalibration || taring_ != Tare::kNone) return Refusal::kBusy;
+      taring_ = Tare::kAveraging;
+      tare_.reset();
+      return Refusal::kNone;
+    case Request::kReset:
+      if (phase != Phase::kStopped) return Refusal::kNotStopped;
+      if (state_.tripped.any()) return Refusal::kCauseRemains;
+      state_.phase = Phase::kDisarmed;
+      state_.segment = -1;
+      state_.latched = {};
+      state_.cause = Check::kCount;
+      state_.cause_tick = -1;
+      fresh_ticks_ = 0;
+      wish_ = Request::kNone;
+      return Refusal::kNone;
+  }
+  return Refusal::kNone;
+}
 
+void TestPlatform::choosePhase() noexcept {
   switch (state_.phase) {
     case Phase::kDisarmed:
-      if (start_requested_ && fresh_ticks_ > config_.arming_samples && !state_.tripped.any())
+      if (wish_ != Request::kNone && fresh_ticks_ > config_.arming_samples && !state_.tripped.any())
         state_.phase = Phase::kArmed;
       break;
     case Phase::kArmed:
+      if (wish_ == Request::kStart) beginProgram(0);
+      wish_ = Request::kNone;
+      break;
     case Phase::kRunning:
-      if (request == Request::kStop)
-        state_.segment = config_.program.size;
-      else if (state_.phase == Phase::kArmed || segmentIsOver())
-        ++state_.segment;
+      if (!segmentIsOver()) break;
+      // A program does not go on without the calibration it asked for.
+      if (state_.segment >= 0 && calibration_.status() != Calibration::Status::kRefused)
+        beginProgram(state_.segment + 1);
+      else if (state_.segment >= 0)
+        beginReturn();
       else
-        break;
-      beginSegment();
+        state_.phase = Phase::kArmed;
       break;
     case Phase::kReturning:
-      if (n_ >= steps_) state_.phase = Phase::kParked;
+      if (n_ < steps_) break;
+      state_.phase = attended_ ? Phase::kArmed : Phase::kParked;
+      if (attended_) state_.segment = -1;
       break;
     case Phase::kParked:
     case Phase::kStopped: break;
@@ -126,58 +178,86 @@ void TestPlatform::choosePhase(Request request) noexcept {
 }
 
 bool TestPlatform::segmentIsOver() const noexcept {
-  switch (segment().kind) {
-    case SegmentKind::kCalibration: return calibration_.complete();
+  switch (segment_.kind) {
+    case SegmentKind::kCalibration: return calibration_.status() != Calibration::Status::kTaking;
+    case SegmentKind::kWatch: return state_.tick - begun_ >= steps_;
     case SegmentKind::kMove:
     case SegmentKind::kTrajectory:
-    case SegmentKind::kAdmittance: return n_ >= steps_;
+    case SegmentKind::kAdmittance:
+    case SegmentKind::kCount: break;
   }
-  return true;
+  return n_ >= steps_;
 }
 
 /// The admittance model determines the next state; everything else says where to be now.
 bool TestPlatform::commandsNextState() const noexcept {
-  return state_.phase == Phase::kRunning && segment().kind == SegmentKind::kAdmittance;
+  return state_.phase == Phase::kRunning && segment_.kind == SegmentKind::kAdmittance;
 }
 
-void TestPlatform::beginSegment() noexcept {
-  if (state_.segment >= config_.program.size) {
-    state_.phase = Phase::kReturning;
-    beginMove(Vec6::Zero(), 0.0);
-    return;
-  }
+void TestPlatform::beginProgram(int at) noexcept {
+  state_.segment = at;
+  if (at < config_.program.size)
+    begin(config_.program.segments[static_cast<std::size_t>(at)]);
+  else
+    beginReturn();
+}
+
+void TestPlatform::begin(const Segment& segment) noexcept {
   state_.phase = Phase::kRunning;
-  const Segment& s = segment();
+  segment_ = segment;
   n_ = 0;
-  steps_ = std::llround(s.duration / period_);
+  begun_ = state_.tick;
+  steps_ = std::llround(segment.duration / period_);
   segment_start_ = state_.motion.x;
-  switch (s.kind) {
-    case SegmentKind::kCalibration: calibration_.reset(); break;
-    case SegmentKind::kMove: beginMove(s.target.stacked(), s.duration); break;
-    case SegmentKind::kTrajectory: break;
+  switch (segment.kind) {
+    case SegmentKind::kCalibration: calibration_.begin(); break;
+    case SegmentKind::kMove: beginMove(segment.target.stacked(), segment.duration); break;
     case SegmentKind::kAdmittance: admittance_.reset(segment_start_); break;
+    case SegmentKind::kTrajectory:
+    case SegmentKind::kWatch:
+    case SegmentKind::kCount: break;
   }
 }
 
-/// To rest where braking at a gentle rate ends, then by a quintic to `target`; 0 s: as long as is
-/// gentle.
-void TestPlatform::beginMove(const Vec6& target, double duration) noexcept {
-  const Vec6& x = state_.motion.x;
+void TestPlatform::beginReturn() noexcept {
+  state_.phase = Phase::kReturning;
+  state_.segment = config_.program.size;
+  beginMove(Vec6::Zero(), 0.0);
+}
+
+/// Plans the braking at a gentle rate; where it ends.
+Vec6 TestPlatform::brake() noexcept {
   const Vec6& v = state_.motion.x_dot;
-  const double brake_time = std::max(v.head<3>().norm() / config_.gentle_braking,
-                                     v.tail<3>().norm() / config_.gentle_rotation_braking);
+  const double time = std::max(v.head<3>().norm() / config_.gentle_braking,
+                               v.tail<3>().norm() / config_.gentle_rotation_braking);
   brake_ = Quintic<6>();
-  Vec6 rest = x;
-  if (brake_time > 0.0) {
-    rest += 0.5 * brake_time * v;
-    PathPoint<6> from = atRest(x);
-    from.x_dot = v;
-    brake_ = Quintic<6>(from, rest, brake_time);
-  }
+  if (!(time > 0.0)) return state_.motion.x;
+  const Vec6 rest = state_.motion.x + 0.5 * time * v;
+  PathPoint<6> from = atRest(state_.motion.x);
+  from.x_dot = v;
+  brake_ = Quintic<6>(from, rest, time);
+  return rest;
+}
+
+/// To rest, then by a quintic to `target`; 0 s: as long as is gentle.
+void TestPlatform::beginMove(const Vec6& target, double duration) noexcept {
+  const Vec6 rest = brake();
   if (duration <= 0.0) duration = gentleDuration(rest, target);
   move_ = Quintic<6>(atRest(rest), target, duration);
   n_ = 0;
-  steps_ = static_cast<std::int64_t>(std::ceil((brake_time + duration) / period_));
+  steps_ = static_cast<std::int64_t>(std::ceil((brake_.duration() + duration) / period_));
+}
+
+/// Brakes, and is armed again.
+void TestPlatform::hold() noexcept {
+  state_.phase = Phase::kRunning;
+  state_.segment = -1;
+  segment_ = {};
+  segment_.kind = SegmentKind::kMove;
+  const Vec6 rest = brake();
+  move_ = Quintic<6>(atRest(rest), rest, period_);
+  n_ = 0;
+  steps_ = static_cast<std::int64_t>(std::ceil(brake_.duration() / period_));
 }
 
 PathPoint<6> TestPlatform::moveAt(std::int64_t n) const noexcept {
@@ -193,33 +273,77 @@ double TestPlatform::gentleDuration(const Vec6& from, const Vec6& to) const noex
 
 PathPoint<6> TestPlatform::nextMotion(const Sample& sample) noexcept {
   switch (state_.phase) {
-    case Phase::kDisarmed:
-    case Phase::kArmed: return atRest(state_.measured.stacked());
+    case Phase::kDisarmed: return atRest(state_.measured.stacked());
+    case Phase::kArmed:
+      return atRest(state_.command.engaged ? state_.motion.x : state_.measured.stacked());
     case Phase::kReturning: return moveAt(++n_);  // where it starts, the platform is already
     case Phase::kParked:
     case Phase::kStopped: return atRest(state_.motion.x);
     case Phase::kRunning: break;
   }
   const std::int64_t n = ++n_;
-  switch (segment().kind) {
-    case SegmentKind::kCalibration:
-      if (state_.age == 0 && sample.q.allFinite()) {
-        calibration_.add(sample.adc, S_proc_ * staticWrench(config_.payload, sample.q,
-                                                            X_IP_measured_.R, config_.gravity)
-                                                   .stacked());
-        if (calibration_.complete()) state_.bias = calibration_.mean();
-      }
-      return atRest(state_.motion.x);
+  switch (segment_.kind) {
+    case SegmentKind::kCalibration: calibrate(sample); break;
     case SegmentKind::kMove: return moveAt(n);
     case SegmentKind::kTrajectory:
-      return trajectoryGeneration(segment().trajectory, segment_start_, n, steps_, period_);
+      return trajectoryGeneration(segment_.trajectory, segment_start_, n, steps_, period_);
     case SegmentKind::kAdmittance:
       // A wrench that is no number must not enter the model's state; the finite check stops the
       // run.
       if (state_.dynamic.stacked().allFinite()) admittance_.step(state_.dynamic);
       return admittance_.motion();
+    case SegmentKind::kWatch:
+    case SegmentKind::kCount: break;
   }
   return atRest(state_.motion.x);
+}
+
+/// What the static load alone would read.
+Vec6 TestPlatform::staticCounts(const Sample& sample) const noexcept {
+  return S_proc_ *
+         staticWrench(config_.payload, sample.q, X_IP_measured_.R, config_.gravity).stacked();
+}
+
+void TestPlatform::calibrate(const Sample& sample) noexcept {
+  if (state_.age == 0) calibration_.add(sample, staticCounts(sample));
+  state_.calibration = calibration_.status();
+  state_.unrest = calibration_.unrest();
+  state_.unrest_index = calibration_.unrestIndex();
+  state_.unrest_amount = calibration_.unrestAmount();
+  if (calibration_.status() != Calibration::Status::kDone) return;
+  state_.bias = calibration_.statistics().mean();
+  state_.deviation = calibration_.statistics().deviation();
+  state_.standard_error = calibration_.statistics().standardError();
+}
+
+/// The bias slides to what the sensor reads beyond the static load, on average: the admittance
+/// model never sees a step.
+void TestPlatform::tare(const Sample& sample) noexcept {
+  switch (taring_) {
+    case Tare::kNone: return;
+    case Tare::kAveraging:
+      if (state_.age != 0 || !sample.q.allFinite()) return;
+      tare_.add(sample.adc, staticCounts(sample));
+      if (!tare_.complete()) return;
+      bias_path_ = Quintic<6>(atRest(state_.bias), tare_.mean(), config_.tare_ramp);
+      tare_n_ = 0;
+      taring_ = Tare::kRamping;
+      return;
+    case Tare::kRamping:
+      const double t = static_cast<double>(++tare_n_) * period_;
+      state_.bias = bias_path_.at(t).x;
+      if (t >= config_.tare_ramp) taring_ = Tare::kNone;
+  }
+}
+
+/// Until the next look of a watch, its last tick excepted.
+std::int64_t TestPlatform::idleTicks() const noexcept {
+  if (state_.kind != SegmentKind::kWatch) return 0;
+  const std::int64_t interval = std::llround(segment_.interval / period_);
+  if (interval <= kCalibrationSamples) return 0;
+  const std::int64_t since = state_.tick - begun_, into = since % interval;
+  if (into < kCalibrationSamples - 1) return 0;
+  return std::max<std::int64_t>(0, std::min(interval - into, steps_ - since) - 1);
 }
 
 Tripped TestPlatform::safetyChecks(const TickInput& in, const PathPoint<6>& next,

@@ -29,14 +29,15 @@ void ForceTorqueSensor::advance(const Step& step, const Wrench& F_So_S) noexcept
   filter_.advance(step, volts, held);
 }
 
-AdcCounts ForceTorqueSensor::convert() const noexcept {
+AdcCounts ForceTorqueSensor::convert(double warmer) const noexcept {
   const auto count = [this](double volts) {
     return static_cast<std::int32_t>(
         std::lround(std::clamp(volts / model_.volts_per_count, -32768.0, 32767.0)));
   };
   AdcCounts adc{};
   for (int i = 0; i < kWrenchChannels; ++i)
-    adc[static_cast<std::size_t>(i)] = count(filter_.output()(i) + model_.bias(i));
+    adc[static_cast<std::size_t>(i)] =
+        count(filter_.output()(i) + model_.bias(i) + model_.drift(i) * warmer);
   adc[kWrenchChannels] = count(model_.pressure);
   return adc;
 }

@@ -10,6 +10,8 @@ namespace {
 double seconds(std::int64_t ns) { return static_cast<double>(ns) * kSecondPerNanosecond; }
 
 constexpr std::int64_t kMidUpdate = kUpdatePeriod / 2;  // [ns]
+constexpr double kStillSpeed = 1e-9;                    // [m/s]
+constexpr std::int64_t kSettle = 100'000'000;           // [ns] between looks whether all is still
 
 Transform inverse(const Transform& X_AB) {
   return {X_AB.R.transpose(), X_AB.R.transpose() * -X_AB.p};
@@ -100,7 +102,36 @@ bool Plant::moveRobot(const RobotMove& move) noexcept {
   return true;
 }
 
+double Climate::at(double t) const noexcept {
+  return mean + 0.5 * swing * std::sin(2.0 * M_PI * (t - rising) / period);
+}
+
+/// No valve is open, no joint is on its way, and nothing is planned.
+bool Plant::still() const noexcept {
+  if (next_robot_event_ != kNever) return false;
+  for (std::size_t i = 0; i < kLegs; ++i)
+    if (slaves_[i].code() != 0 || std::abs(actuators_[i].velocity()) > kStillSpeed) return false;
+  for (const JointPath& joint : paths_)
+    if (seconds(now_ - joint.start) < joint.path.duration()) return false;
+  return true;
+}
+
+/// Whole LegSlave periods, so that every phase stays, up to a second before `until`.
+void Plant::skip(std::int64_t until) noexcept {
+  const std::int64_t time = (until - now_ - 1'000'000'000) / kUpdatePeriod * kUpdatePeriod;
+  now_ += time;
+  last_look_ += time;
+  next_reading_ += time;
+  if (next_look_ != kNever) next_look_ += time;
+}
+
 void Plant::advance(std::int64_t until) noexcept {
+  while (until - now_ > kSkipped && !still()) runEvents(now_ + kSettle);
+  if (until - now_ > kSkipped) skip(until);
+  runEvents(until);
+}
+
+void Plant::runEvents(std::int64_t until) noexcept {
   for (;;) {
     const std::int64_t next = std::min({next_reading_, next_look_, next_robot_event_});
     if (next > until) break;
@@ -197,7 +228,8 @@ Sample Plant::sample() noexcept {
   Sample s;
   s.sequence = ++sequence_;
   s.time = now_;
-  s.adc = sensor_.convert();
+  s.temperature = config_.climate.at(seconds(now_));
+  s.adc = sensor_.convert(s.temperature - config_.climate.mean);
   for (std::size_t i = 0; i < kLegs; ++i) {
     s.legs[i] = config_.transducer.count(actuators_[i].length());
     truth_.current(static_cast<Eigen::Index>(i)) = slaves_[i].current();

@@ -23,9 +23,14 @@ void forEachField(const state_t& m, F f) {
   f("count", -1, m.count);
   f("sample_sequence", -1, m.sample_sequence);
   f("request", -1, m.request);
+  f("order_source", -1, m.order_source);
+  f("order_sequence", -1, m.order_sequence);
+  f("refusal", -1, m.refusal);
   f("rival", -1, m.rival);
   f("phase", -1, m.phase);
   f("segment", -1, m.segment);
+  f("kind", -1, m.kind);
+  f("idle", -1, m.idle);
   f("age", -1, m.age);
   list("total", m.total);
   list("fixed", m.fixed);
@@ -40,6 +45,12 @@ void forEachField(const state_t& m, F f) {
   list("leg_measured", m.leg_measured);
   list("x_measured", m.x_measured);
   list("bias", m.bias);
+  f("calibration", -1, m.calibration);
+  f("unrest", -1, m.unrest);
+  f("unrest_index", -1, m.unrest_index);
+  f("unrest_amount", -1, m.unrest_amount);
+  list("deviation", m.deviation);
+  list("standard_error", m.standard_error);
   f("tripped", -1, m.tripped);
   f("latched", -1, m.latched);
   f("cause", -1, m.cause);
@@ -91,6 +102,8 @@ class Replayer {
         configure();
       else if (event_.channel == channel::kSample)
         keepSample();
+      else if (event_.channel == channel::kOperator)
+        keepOrder();
       else if (event_.channel == channel::kState)
         replayTick();
       else if (event_.channel == channel::kLegCommand)
@@ -132,6 +145,23 @@ class Replayer {
     if (const auto sample = fromMessage(m)) samples_.put(m.header.sequence, *sample);
   }
 
+  void keepOrder() {
+    const auto m = decoded<operator_t>();
+    if (const auto order = fromMessage(m)) orders_.push_back(*order);
+  }
+
+  Order orderOf(const state_t& recorded) const {
+    Order order;
+    order.request = static_cast<Request>(recorded.request);
+    order.id = {recorded.order_source, recorded.order_sequence};
+    if (order.request != Request::kRun) return order;
+    for (const Order& known : orders_)
+      if (known.id.source == order.id.source && known.id.sequence == order.id.sequence)
+        return known;
+    fail(fmt::format("tick {} followed order {}, which is not in this log",
+                     recorded.header.sequence, order.id.sequence));
+  }
+
   void replayTick() {
     if (!platform_) fail("a tick before any configuration");
     const auto recorded = decoded<state_t>();
@@ -146,7 +176,7 @@ class Replayer {
                              recorded.header.sequence));
     TickInput in;
     in.tick = recorded.header.sequence;
-    in.request = static_cast<Request>(recorded.request);
+    in.order = orderOf(recorded);
     in.rival = recorded.rival != 0;
     if (recorded.sample_sequence >= 0) {
       const Sample* sample = samples_.find(recorded.sample_sequence);
@@ -209,6 +239,7 @@ class Replayer {
   std::int64_t period_ = 0;      // [ns]
   std::int64_t start_ = 0;       // [ns]
   Recent<Sample> samples_;
+  std::vector<Order> orders_;
   Recent<leg_command_t> recorded_commands_, replayed_commands_;
   ReplayResult result_;
 };

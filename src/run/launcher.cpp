@@ -82,28 +82,34 @@ RunResult runProcesses(const Experiment& experiment, const LaunchOptions& option
   RunResult result;
   std::int64_t source = 0;  // of our controller: the first to be heard
   std::int64_t heard = 0;   // [-] of its states
-  bus.subscribe("VES_(SAMPLE|LEG_COMMAND|STATE|TRUTH|TIMING|ROBOT|OPERATOR)",
-                [&](const std::string& channel, const void* data, std::uint32_t size) {
-                  if (log) log->write(channel, data, size, wallClock());
-                  if (channel != channel::kState) return;
-                  const auto state = decode<state_t>(data, size);
-                  if (!state) return;
-                  if (source == 0) source = state->header.source;
-                  if (state->header.source != source) return;
-                  ++heard;
-                  result.ticks = state->count + 1;
-                  result.phase = static_cast<Phase>(state->phase);
-                  result.cause = result.phase == Phase::kDisarmed
-                                     ? Tripped(static_cast<std::uint32_t>(state->tripped)).first()
-                                     : static_cast<Check>(state->cause);
-                  result.cause_tick = state->cause_tick;
-                  watch(*state);
-                });
+  bus.subscribe(
+      "VES_(SAMPLE|LEG_COMMAND|STATE|TRUTH|TIMING|ROBOT|OPERATOR)",
+      [&](const std::string& channel, const void* data, std::uint32_t size) {
+        if (log) log->write(channel, data, size, wallClock());
+        if (channel != channel::kState) return;
+        const auto state = decode<state_t>(data, size);
+        if (!state) return;
+        if (source == 0) source = state->header.source;
+        if (state->header.source != source) return;
+        ++heard;
+        result.ticks = state->count + 1;
+        result.simulated =
+            static_cast<double>((state->header.sequence + 1) * experiment.controller.period) *
+            kSecondPerNanosecond;
+        result.uncalibrated = state->calibration == static_cast<int>(Calibration::Status::kRefused);
+        result.phase = static_cast<Phase>(state->phase);
+        result.cause = result.phase == Phase::kDisarmed
+                           ? Tripped(static_cast<std::uint32_t>(state->tripped)).first()
+                           : static_cast<Check>(state->cause);
+        result.cause_tick = state->cause_tick;
+        watch(*state);
+      });
 
   std::vector<std::string> shared = {options.scenario.string(), "--url", process.url};
   if (process.lockstep) shared.push_back("--lockstep");
   if (process.realtime) shared.push_back("--realtime");
   std::vector<std::string> arguments = shared;
+  arguments.push_back("--start");
   if (process.lockstep && !process.log.empty())
     arguments.insert(arguments.end(), {"--log", process.log});
 
@@ -122,8 +128,6 @@ RunResult runProcesses(const Experiment& experiment, const LaunchOptions& option
   }
   bus.drain();
   result.wall = static_cast<double>(monotonicNow() - start) * kSecondPerNanosecond;
-  result.simulated =
-      static_cast<double>(result.ticks * experiment.controller.period) * kSecondPerNanosecond;
   if (controller.status() != 0 && controller.status() != 1)
     throw InputError(fmt::format("ves-controller ended with status {}", controller.status()));
   // The last state may be lost on the way; the exit status is not.

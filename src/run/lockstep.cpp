@@ -16,7 +16,8 @@ experiment_t describe(const Experiment& experiment, const Identity& from, std::i
   return m;
 }
 
-RunResult runLockstep(const Experiment& experiment, LogWriter* log, const Watch& watch) {
+RunResult runLockstep(const Experiment& experiment, LogWriter* log, const Watch& watch,
+                      Request first) {
   const Identity controller{1, 0}, machine{2, 0};
   const std::int64_t period = experiment.controller.period;
   TestPlatform platform(experiment.controller);
@@ -30,8 +31,9 @@ RunResult runLockstep(const Experiment& experiment, LogWriter* log, const Watch&
 
   const std::int64_t start = monotonicNow();
   TickInput in;
-  in.request = Request::kStart;
-  for (;; ++in.tick) {
+  in.order.request = first;
+  std::int64_t orders = 0;
+  for (;;) {
     in.sample = plant.sample();
     record(channel::kTruth,
            toMessage(plant.truth(), header(machine, in.sample.sequence, plant.time())));
@@ -41,11 +43,17 @@ RunResult runLockstep(const Experiment& experiment, LogWriter* log, const Watch&
     const header_t h = header(controller, in.tick, plant.time());
     record(channel::kState, toMessage(state, in, h));
     record(channel::kLegCommand, toMessage(state.command, h));
-    in.request = watch ? watch(state) : Request::kNone;
-    if (ending.reached(state)) break;
+    in.order = watch ? watch(state) : Order();
+    if (ending.reached(state, in.order.request)) break;
+    if (in.order.request == Request::kRun) {
+      in.order.id = {controller.source, orders++};
+      record(channel::kOperator, toMessage(in.order, controller.source,
+                                           header(controller, in.order.id.sequence, plant.time())));
+    }
 
+    in.tick += 1 + state.idle;
     plant.command(state.command);
-    plant.advance((in.tick + 1) * period);
+    plant.advance(in.tick * period);
   }
   RunResult result = ending.result(monotonicNow() - start);
   if (log) result.lost = log->lost();

@@ -29,31 +29,28 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
   Bus bus(options.url);
   ControllerLink link(bus, self);
   TestPlatform platform(experiment.controller);
-  Ending ending(experiment.controller);
+  Ending ending(experiment.controller, !options.start);
 
   std::unique_ptr<LogWriter> log;
   if (!options.log.empty()) {
     log = std::make_unique<LogWriter>(options.log);
     log->write(channel::kExperiment, describe(experiment, self, 0), 0);
-    bus.subscribe("VES_(SAMPLE|TRUTH)", [&log](const std::string& from, const void* data,
-                                               std::uint32_t size) {
-      const auto timeOf = [](const auto& message) { return message ? message->header.time_ns : 0; };
-      log->write(from, data, size,
-                 from == channel::kSample ? timeOf(decode<sample_t>(data, size))
-                                          : timeOf(decode<truth_t>(data, size)));
-    });
+    bus.subscribe("VES_(SAMPLE|TRUTH|OPERATOR)",
+                  [&](const std::string& from, const void* data, std::uint32_t size) {
+                    log->write(from, data, size, link.sampleTime());
+                  });
   }
   bus.publish(channel::kExperiment, describe(experiment, self, monotonicNow()));
 
   TickInput in;
-  in.request = Request::kStart;
+  if (options.start) in.order.request = Request::kStart;
   const std::int64_t start = monotonicNow();
 
   const auto finish = [&](const TickState& state) {
-    in.request = watch ? watch(state) : Request::kNone;
-    if (const Request wish = link.takeRequest(); wish != Request::kNone) in.request = wish;
+    in.order = watch(state);
+    if (in.order.request == Request::kNone) in.order = link.takeOrder();
     in.rival = link.takeRival();
-    return ending.reached(state);
+    return ending.reached(state, in.order.request);
   };
 
   if (options.lockstep) {
@@ -61,7 +58,7 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
     // is repeated; the answer to a repeated one is the same sample again.
     LegCommand none;
     leg_command_t out = toMessage(none, header(self, -1, 0));
-    for (;; ++in.tick) {
+    for (;;) {
       for (int i = 0; link.answers() != in.tick - 1; ++i) {
         if (i == kAnswerTries)
           throw InputError(fmt::format("bus {}: no machine in lockstep answers", options.url));
@@ -80,6 +77,9 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
         log->write(channel::kLegCommand, out, in.sample.time);
       }
       if (finish(state)) break;
+      // Sent as the command of the last tick that is passed over: the machine goes on to its end.
+      in.tick += 1 + state.idle;
+      out.header.sequence = in.tick - 1;
       link.send(out);
       bus.drain();
     }
@@ -153,7 +153,7 @@ void runPlant(const Experiment& experiment, const ProcessOptions& options,
       }
       if (tick == answered) {
         bus.publish(channel::kSample, last);
-      } else if (tick == answered + 1) {
+      } else if (tick == -1 || (answered > -2 && tick > answered)) {
         if (tick >= 0) {
           plant.command(legs);
           plant.advance(start + (tick + 1) * period);

@@ -6,6 +6,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
 
 #include "ves/config/document.hpp"
@@ -130,14 +131,36 @@ ControllerLink::ControllerLink(Bus& bus, const Identity& self) : bus_(bus), self
                 });
   bus.subscribe(channel::kOperator,
                 [this](const std::string&, const void* data, std::uint32_t size) {
-                  const auto message = decode<operator_t>(data, size);
-                  const auto request = message ? fromMessage(*message) : std::nullopt;
-                  if (!request) {
+                  if (const auto message = decode<operator_t>(data, size))
+                    receiveOrder(*message);
+                  else
                     ++rejected_;
-                    return;
-                  }
-                  if (*request != Request::kNone) request_ = *request;
                 });
+}
+
+void ControllerLink::receiveOrder(const operator_t& message) noexcept {
+  const auto order = fromMessage(message);
+  if (!order || message.controller != self_.source) {
+    ++rejected_;
+    return;
+  }
+  for (const OrderId& id : known_)
+    if (id.source == order->id.source && id.sequence == order->id.sequence) return;
+  if (order->request == Request::kStop || order->request == Request::kHold) waiting_ = 0;
+  if (waiting_ == kOrders) {
+    ++rejected_;
+    return;
+  }
+  orders_[waiting_++] = *order;
+  known_[next_known_++ % kOrders] = order->id;
+}
+
+Order ControllerLink::takeOrder() noexcept {
+  if (waiting_ == 0) return {};
+  const Order oldest = orders_[0];
+  std::move(orders_.begin() + 1, orders_.begin() + static_cast<std::ptrdiff_t>(waiting_--),
+            orders_.begin());
+  return oldest;
 }
 
 void ControllerLink::send(const leg_command_t& command) noexcept {

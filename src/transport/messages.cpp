@@ -22,7 +22,12 @@ bool inRange(T x, T lo, T hi) {
   return x >= lo && x <= hi;
 }
 
-constexpr double kMaxJointValue = 1e3;  // [rad | m]
+constexpr double kMaxJointValue = 1e3;                  // [rad | m]
+constexpr double kColdest = -273.15, kHottest = 200.0;  // [C]
+constexpr double kMaxTime = 1e6;                        // [s] of an order
+constexpr double kMaxTranslation = 10.0;                // [m]
+constexpr double kMaxRotation = 10.0;                   // [rad]
+constexpr double kMaxFrequency = 1e3;                   // [Hz]
 
 }  // namespace
 
@@ -51,6 +56,7 @@ sample_t toMessage(const Sample& sample, const Identity& from, std::int64_t answ
   std::copy(sample.legs.begin(), sample.legs.end(), m.legs);
   m.switches = static_cast<std::int32_t>(sample.switches);
   put(sample.q, m.q);
+  m.temperature = sample.temperature;
   return m;
 }
 
@@ -68,10 +74,15 @@ state_t toMessage(const TickState& state, const TickInput& in, const header_t& h
   m.header = header;
   m.count = state.count;
   m.sample_sequence = state.sample_sequence;
-  m.request = static_cast<std::int32_t>(in.request);
+  m.request = static_cast<std::int32_t>(in.order.request);
+  m.order_source = in.order.id.source;
+  m.order_sequence = in.order.id.sequence;
+  m.refusal = static_cast<std::int32_t>(state.refusal);
   m.rival = in.rival ? 1 : 0;
   m.phase = static_cast<std::int32_t>(state.phase);
   m.segment = state.segment;
+  m.kind = static_cast<std::int32_t>(state.kind);
+  m.idle = state.idle;
   m.age = state.age;
   put(state.total.stacked(), m.total);
   put(state.fixed.stacked(), m.fixed);
@@ -86,12 +97,38 @@ state_t toMessage(const TickState& state, const TickInput& in, const header_t& h
   put(state.L_measured, m.leg_measured);
   put(state.measured.stacked(), m.x_measured);
   put(state.bias, m.bias);
+  m.calibration = static_cast<std::int32_t>(state.calibration);
+  m.unrest = static_cast<std::int32_t>(state.unrest);
+  m.unrest_index = state.unrest_index;
+  m.unrest_amount = state.unrest_amount;
+  put(state.deviation, m.deviation);
+  put(state.standard_error, m.standard_error);
   m.tripped = static_cast<std::int32_t>(state.tripped.bits());
   m.latched = static_cast<std::int32_t>(state.latched.bits());
   m.cause = static_cast<std::int32_t>(state.cause);
   m.cause_tick = state.cause_tick;
   m.engaged = state.command.engaged ? 1 : 0;
   std::copy(state.command.counts.begin(), state.command.counts.end(), m.counts);
+  return m;
+}
+
+operator_t toMessage(const Order& order, std::int64_t controller, const header_t& header) noexcept {
+  operator_t m;
+  m.header = header;
+  m.controller = controller;
+  m.request = static_cast<std::int32_t>(order.request);
+  const Segment& s = order.segment;
+  m.kind = static_cast<std::int32_t>(s.kind);
+  m.duration = s.duration;
+  m.interval = s.interval;
+  put(s.target.stacked(), m.target);
+  for (int i = 0; i < 6; ++i) {
+    const Axis& axis = s.trajectory[static_cast<std::size_t>(i)];
+    m.motion[i] = static_cast<std::int32_t>(axis.motion);
+    m.final[i] = axis.final;
+    m.amplitude[i] = axis.amplitude;
+    m.frequency[i] = axis.frequency;
+  }
   return m;
 }
 
@@ -154,6 +191,8 @@ std::optional<Sample> fromMessage(const sample_t& m) noexcept {
     good = good && inRange(m.q[i], -kMaxJointValue, kMaxJointValue);
   }
   s.switches = static_cast<std::uint32_t>(m.switches) & kAllSwitchesClosed;
+  s.temperature = m.temperature;
+  good = good && inRange(m.temperature, kColdest, kHottest);
   if (!good) return {};
   return s;
 }
@@ -178,9 +217,33 @@ std::optional<plant::RobotMove> fromMessage(const robot_command_t& m) noexcept {
   return plant::RobotMove{m.joint, m.target, m.duration};
 }
 
-std::optional<Request> fromMessage(const operator_t& m) noexcept {
-  if (!inRange(m.request, 0, 2)) return {};
-  return static_cast<Request>(m.request);
+std::optional<Order> fromMessage(const operator_t& m) noexcept {
+  if (!inRange(m.request, 1, static_cast<int>(Request::kCount) - 1)) return {};
+  Order order;
+  order.request = static_cast<Request>(m.request);
+  order.id = {m.header.source, m.header.sequence};
+  if (m.header.sequence < 0) return {};
+  if (order.request != Request::kRun) return order;
+
+  Segment& s = order.segment;
+  if (!inRange(m.kind, 0, static_cast<int>(SegmentKind::kCount) - 1)) return {};
+  s.kind = static_cast<SegmentKind>(m.kind);
+  s.duration = m.duration;
+  s.interval = m.interval;
+  s.target = Pose::from(Vec6::Map(m.target));
+  bool good = inRange(m.duration, 0.0, kMaxTime) && inRange(m.interval, 0.0, kMaxTime);
+  for (int i = 0; i < 6; ++i) {
+    const double reach = i < 3 ? kMaxTranslation : kMaxRotation;
+    Axis& axis = s.trajectory[static_cast<std::size_t>(i)];
+    good = good && inRange(m.motion[i], 0, static_cast<int>(AxisMotion::kSine)) &&
+           inRange(m.target[i], -reach, reach) && inRange(m.final[i], -reach, reach) &&
+           inRange(m.amplitude[i], -reach, reach) && inRange(m.frequency[i], 0.0, kMaxFrequency);
+    axis = {static_cast<AxisMotion>(m.motion[i]), m.final[i], m.amplitude[i], m.frequency[i]};
+  }
+  if (s.kind == SegmentKind::kTrajectory || s.kind == SegmentKind::kAdmittance)
+    good = good && m.duration > 0.0;
+  if (!good) return {};
+  return order;
 }
 
 }  // namespace ves

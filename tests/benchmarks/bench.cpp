@@ -145,7 +145,7 @@ void ControllerTick(benchmark::State& state) {  // admittance control, PUMA, six
   TestPlatform platform(e.controller);
   plant::Plant plant(e.plant);
   TickInput in;
-  in.request = Request::kStart;
+  in.order.request = Request::kStart;
   for (; in.tick < 700; ++in.tick) {  // into the admittance segment
     in.sample = plant.sample();
     plant.command(platform.tick(in).command);

@@ -3,6 +3,7 @@
 // Force measurement (Appendix C): A/D counts to the wrench on the platform.
 #pragma once
 
+#include "ves/control/program.hpp"
 #include "ves/control/sample.hpp"
 
 namespace ves {
@@ -20,25 +21,74 @@ Wrench sensorWrench(const ForceSensor& sensor, const Vec6& bias, const AdcCounts
 Wrench forceMeasurement(const ForceSensor& sensor, const Vec6& bias, const AdcCounts& adc,
                         const Mat3& R_IP) noexcept;
 
-/// The calibration routine (report, 2.3): mean and standard deviation of each channel over a number
-/// of samples taken at rest.
-class Calibration {
+/// How much may change while the machine counts as still.
+struct StillnessLimits {
+  int leg_counts = 0;      // [count] of a leg's reading
+  double joint = 0.0;      // [rad | m] of the robot
+  double deviation = 0.0;  // [count] standard deviation of a wrench channel
+};
+
+/// Mean, standard deviation and standard error of the six wrench channels over kCalibrationSamples.
+class ChannelStatistics {
  public:
-  static constexpr int kSamples = 100;  // [-] per channel
-
-  /// `load` is what the static load alone would read: taken out, so that a known robot may be
-  /// aboard.
+  /// `load` is what the known static load alone would read: taken out.
   void add(const AdcCounts& adc, const Vec6& load) noexcept;
-  void reset() noexcept { *this = Calibration(); }
+  void reset() noexcept { *this = ChannelStatistics(); }
 
-  bool complete() const noexcept { return n_ >= kSamples; }
-  const Vec6& mean() const noexcept { return mean_; }  // [count] the bias
-  Vec6 deviation() const noexcept;                     // [count] sample standard deviation
+  bool complete() const noexcept { return n_ >= kCalibrationSamples; }
+  const Vec6& mean() const noexcept { return mean_; }  // [count]
+  Vec6 deviation() const noexcept;                     // [count] of one sample
+  /// [count] of the mean, from the spread of the means of kBatches batches: successive samples
+  /// behind a 20 Hz filter are not independent, their batches nearly are.
+  Vec6 standardError() const noexcept;
 
  private:
+  static constexpr int kBatches = 10;
+  static constexpr int kBatchSize = kCalibrationSamples / kBatches;
+
   int n_ = 0;
   Vec6 mean_ = Vec6::Zero();
   Vec6 m2_ = Vec6::Zero();  // sum of squared differences from the mean
+  Vec6 batch_sum_ = Vec6::Zero();
+  Vec6 batch_mean_ = Vec6::Zero();  // of the batches
+  Vec6 batch_m2_ = Vec6::Zero();
+};
+
+/// What kept a calibration from being taken.
+enum class Unrest : std::int32_t { kNone, kLeg, kJoint, kChannel };
+
+/// The calibration routine (report, 2.3): the bias of each channel over 100 samples at rest. Starts
+/// again whenever something moves, and gives up after kPatience samples.
+class Calibration {
+ public:
+  enum class Status : std::int32_t { kNone, kTaking, kDone, kRefused };
+  static constexpr int kPatience = 5 * kCalibrationSamples;  // [-] samples
+
+  explicit Calibration(const StillnessLimits& limits) : limits_(limits) {}
+
+  void begin() noexcept;
+  void add(const Sample& sample, const Vec6& load) noexcept;
+
+  Status status() const noexcept { return status_; }
+  const ChannelStatistics& statistics() const noexcept { return statistics_; }
+  /// Of the last movement seen: what, which (from 0), and how much [count | rad | m].
+  Unrest unrest() const noexcept { return unrest_; }
+  int unrestIndex() const noexcept { return unrest_index_; }
+  double unrestAmount() const noexcept { return unrest_amount_; }
+
+ private:
+  void restart(Unrest what, int index, double amount) noexcept;
+  bool moved(const Sample& sample) noexcept;
+
+  StillnessLimits limits_;
+  Status status_ = Status::kNone;
+  int samples_ = 0;  // [-] since begin()
+  bool has_first_ = false;
+  Sample first_;
+  ChannelStatistics statistics_;
+  Unrest unrest_ = Unrest::kNone;
+  int unrest_index_ = 0;
+  double unrest_amount_ = 0.0;
 };
 
 }  // namespace ves

@@ -28,6 +28,7 @@ struct Sample {
   LegCounts legs{};                     // [count] Temposonics
   JointVector q = JointVector::Zero();  // [rad | m] the robot's joints
   std::uint32_t switches = 0;           // bits of Switch
+  double temperature = 20.0;            // [C] of the laboratory, by a thermometer beside the sensor
 };
 
 struct LegCommand {

@@ -2,17 +2,24 @@
 //
 // testPlatform: the routines of Appendix C in their order, once every controller period.
 //
-//                    start                program over
-//   disarmed -> armed -----> running ------------------> returning -> parked
-//                  \            \   stop requested           ^ |
-//                   \            `---------------------------' |
-//                    `-- any check trips -> stopped <----------'
+//              start, arm          program, order
+//   disarmed -------------> armed ---------------> running --------.
+//       ^                   |   ^ <------ over ------'  |          | any check trips
+//       | reset             |   `------- held ----------|          |
+//       |              stop |                           | stop     v
+//       |                   `-------> returning <-------'       stopped
+//       |                                 |                        |
+//       |                                 `--> parked              |
+//       `----------------------------------------------------------'
+//
+// Armed is holding still, ready for an order. A program started without anybody in attendance ends
+// by returning to home and parking. A trip holds the last checked lengths until a reset, which is
+// refused while its cause remains; what follows begins at the measured pose again.
 //
 // The invariant: every command that leaves is either the checked new lengths or the last checked
 // ones.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <string_view>
 
@@ -20,45 +27,21 @@
 #include "ves/control/force_measurement.hpp"
 #include "ves/control/gravity_compensation.hpp"
 #include "ves/control/leg_communication.hpp"
+#include "ves/control/program.hpp"
 #include "ves/control/safety_checks.hpp"
-#include "ves/control/trajectory_generation.hpp"
 
 namespace ves {
 
 enum class Phase : std::int32_t {
   kDisarmed,   // the legs ignore commands; waiting for a fresh, healthy stream and a start
-  kArmed,      // commanding the measured pose, one tick
-  kRunning,    // the program
+  kArmed,      // holding still; the first command is the measured pose
+  kRunning,    // a segment: of the program, or an order's
   kReturning,  // gently home
   kParked,     // at home, done
   kStopped     // a check tripped; holding the last checked lengths
 };
 
 std::string_view name(Phase phase) noexcept;
-
-enum class SegmentKind : std::int32_t {
-  kCalibration,  // hold, and take the bias of the sensor
-  kMove,         // brakes if it must, then gently to rest at a pose
-  kTrajectory,
-  kAdmittance  // from wherever the platform is, as the model's state at rest
-};
-
-std::string_view name(SegmentKind kind) noexcept;
-
-/// One item of testPlatform's menu.
-struct Segment {
-  SegmentKind kind = SegmentKind::kTrajectory;
-  double duration = 0.0;    // [s]
-  Pose target;              // of a move, from home
-  Trajectory trajectory{};  // of a trajectory
-};
-
-inline constexpr int kMaxSegments = 64;
-
-struct Program {
-  int size = 0;
-  std::array<Segment, kMaxSegments> segments{};
-};
 
 struct ControllerConfig {
   std::int64_t period = 10'000'000;  // [ns]
@@ -76,18 +59,14 @@ struct ControllerConfig {
   double gentle_braking = 1.5;           // [m/s^2] mean, when one begins in motion
   double gentle_rotation_braking = 2.5;  // [rad/s^2] mean
   int arming_samples = 10;               // [-] consecutive ticks with a new sample before arming
-};
-
-enum class Request : std::int32_t {
-  kNone,
-  kStart,  // arm and run the program
-  kStop    // come home gently, end the program
+  StillnessLimits stillness;             // of a calibration
+  double tare_ramp = 1.0;                // [s] over which a tare takes effect
 };
 
 struct TickInput {
   std::int64_t tick = 0;  // [-] counts controller periods, missed ones included
   Sample sample;          // the newest
-  Request request = Request::kNone;
+  Order order;
   bool rival = false;  // another controller or machine was heard since the last tick
 };
 
@@ -97,8 +76,11 @@ struct TickState {
   std::int64_t count = -1;            // [-] ticks run before this one
   std::int64_t sample_sequence = -1;  // [-] of the sample used
   Phase phase = Phase::kDisarmed;
-  std::int32_t segment = -1;       // [-] of the program
-  std::int32_t age = 0;            // [-] ticks since the sample was new
+  std::int32_t segment = -1;               // [-] of the program, -1 outside it
+  SegmentKind kind = SegmentKind::kCount;  // of what runs; kCount: nothing
+  Refusal refusal = Refusal::kNone;        // of this tick's order
+  std::int64_t idle = 0;                   // [-] ticks to come of which nothing is expected
+  std::int32_t age = 0;                    // [-] ticks since the sample was new
   Wrench total, fixed, dynamic;    // F_Po_I measured; of gravity (the report's static); difference
   PathPoint<6> motion;             // commanded coordinates about home, rates, accelerations
   Vec6 due = Vec6::Zero();         // coordinates that the platform should have at this very tick
@@ -106,10 +88,16 @@ struct TickState {
   Vec6 L_measured = Vec6::Zero();  // [m]
   Pose measured;                   // about home, from L_measured
   Vec6 bias = Vec6::Zero();        // [count]
-  Tripped tripped;                 // in this tick
-  Tripped latched;                 // since the start
-  Check cause = Check::kCount;     // the first to latch
-  std::int64_t cause_tick = -1;    // [-]
+  Calibration::Status calibration = Calibration::Status::kNone;  // of the last one asked for
+  Unrest unrest = Unrest::kNone;                                 // what it last saw moving
+  std::int32_t unrest_index = 0;                                 // [-] which one, from 0
+  double unrest_amount = 0.0;                                    // [count | rad | m]
+  Vec6 deviation = Vec6::Zero();                                 // [count] of a channel's samples
+  Vec6 standard_error = Vec6::Zero();                            // [count] of the bias
+  Tripped tripped;                                               // in this tick
+  Tripped latched;                                               // since the start
+  Check cause = Check::kCount;                                   // the first to latch
+  std::int64_t cause_tick = -1;                                  // [-]
   LegCommand command;
 };
 
@@ -128,14 +116,20 @@ class TestPlatform {
  private:
   void readSample(const TickInput& in) noexcept;
   void measureWrench(const Sample& sample) noexcept;
-  void choosePhase(Request request) noexcept;
-  void beginSegment() noexcept;
+  Refusal obey(const Order& order) noexcept;
+  void choosePhase() noexcept;
+  void beginProgram(int at) noexcept;
+  void begin(const Segment& segment) noexcept;
+  void beginReturn() noexcept;
   void beginMove(const Vec6& target, double duration) noexcept;
+  Vec6 brake() noexcept;
+  void hold() noexcept;
   bool segmentIsOver() const noexcept;
   bool commandsNextState() const noexcept;
-  const Segment& segment() const noexcept {
-    return config_.program.segments[static_cast<std::size_t>(state_.segment)];
-  }
+  void calibrate(const Sample& sample) noexcept;
+  void tare(const Sample& sample) noexcept;
+  Vec6 staticCounts(const Sample& sample) const noexcept;
+  std::int64_t idleTicks() const noexcept;
   PathPoint<6> nextMotion(const Sample& sample) noexcept;
   Tripped safetyChecks(const TickInput& in, const PathPoint<6>& next, const BodyMotion& P,
                        const LegMotion& legs) const noexcept;
@@ -149,13 +143,20 @@ class TestPlatform {
   AdmittanceModel admittance_;
   Mat6 S_proc_;  // [count per N | N m]
   Calibration calibration_;
+  ChannelStatistics tare_;  // what the sensor feels beyond what it should
+  enum class Tare { kNone, kAveraging, kRamping } taring_ = Tare::kNone;
+  Quintic<6> bias_path_;     // [count] of a tare
+  std::int64_t tare_n_ = 0;  // [-] ticks since it began
   TickState state_;
   Transform X_IP_measured_;
-  bool legs_solved_ = false;  // forward kinematics found the pose of this sample
-  int fresh_ticks_ = 0;       // [-] consecutive ticks with a new sample and no rival
-  bool start_requested_ = false;
-  std::int64_t n_ = 0;      // [-] ticks of the segment (or the return) so far
-  std::int64_t steps_ = 0;  // [-] periods that it lasts
+  bool legs_solved_ = false;       // forward kinematics found the pose of this sample
+  int fresh_ticks_ = 0;            // [-] consecutive ticks with a new sample and no rival
+  Request wish_ = Request::kNone;  // kStart or kArm: what to do once the stream is fresh
+  bool attended_ = false;          // somebody gives orders: hold after what is over
+  Segment segment_;                // that runs
+  std::int64_t n_ = 0;             // [-] ticks of the segment (or the return) so far
+  std::int64_t steps_ = 0;         // [-] periods that it lasts
+  std::int64_t begun_ = 0;         // [-] tick in which it began
   Vec6 segment_start_ = Vec6::Zero();
   Quintic<6> brake_, move_;  // one after the other
 };

@@ -18,6 +18,7 @@ struct ForceTorqueSensorModel {
   double cutoff = 0.0;           // [rad/s] of the two-pole Butterworth filter
   double volts_per_count = 0.0;  // [V/count] K_ad; the report prints 305 mV for 0.305 mV
   double pressure = 0.0;         // [V] hydraulic pressure, seventh channel
+  Vec6 drift = Vec6::Zero();     // [V/C] of the bias with the laboratory's temperature
 
   /// [count/N | count/(N m)] S_proc of (2.6).
   Mat6 S_proc() const { return (gain * (excitation / volts_per_count)).asDiagonal() * S; }
@@ -36,8 +37,8 @@ class ForceTorqueSensor {
   /// The wrench runs from its last value to F_So_S over the step, noise on top.
   void advance(const Step& step, const Wrench& F_So_S) noexcept;
 
-  /// Sixteen bits, saturating, of all seven channels.
-  AdcCounts convert() const noexcept;
+  /// Sixteen bits, saturating, of all seven channels, `warmer` [C] than when the bias was named.
+  AdcCounts convert(double warmer) const noexcept;
 
  private:
   using Channels = Butterworth2<kWrenchChannels>::Channels;

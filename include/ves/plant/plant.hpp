@@ -55,6 +55,15 @@ struct SwitchEvent {
   std::uint32_t switches = 0;  // bits of Switch
 };
 
+/// Temperature of the laboratory: mean + swing/2 sin(2 pi (t - rising)/period).
+struct Climate {
+  double mean = 20.0;                  // [C]
+  double swing = 0.0;                  // [C] from coldest to warmest
+  double period = 86400.0;             // [s]
+  double rising = 0.0;                 // [s] when it passes the mean, rising
+  double at(double t) const noexcept;  // [C]
+};
+
 struct PlantConfig {
   Geometry geometry;
   Pose initial_pose;  // about home
@@ -64,6 +73,7 @@ struct PlantConfig {
   LegFilters filters = LegFilters::kNone;
   double filter_cutoff = 30.0;  // [rad/s] of Filters 1 to 3
   ForceTorqueSensorModel sensor;
+  Climate climate;
   Payload payload;                   // as it is
   Vec3 gravity = {0.0, 0.0, -9.81};  // [m/s^2] g_I
   JointVector initial_joints = JointVector::Zero();
@@ -87,6 +97,7 @@ struct Truth {
 class Plant {
  public:
   static constexpr std::int64_t kNever = INT64_MAX;
+  static constexpr std::int64_t kSkipped = 10'000'000'000;  // [ns]
 
   explicit Plant(const PlantConfig& config);
 
@@ -98,7 +109,8 @@ class Plant {
   /// number or the duration not positive.
   bool moveRobot(const RobotMove& move) noexcept;
 
-  /// Time passes, up to and including the events at `until` [ns].
+  /// Time passes, up to and including the events at `until` [ns]. Where nothing moves, more than
+  /// kSkipped of it are passed over at once: the noise goes on from where it was.
   void advance(std::int64_t until) noexcept;
 
   /// What the controller gets to see, taken now.
@@ -109,6 +121,9 @@ class Plant {
   std::int64_t time() const noexcept { return now_; }  // [ns]
 
  private:
+  void runEvents(std::int64_t until) noexcept;
+  bool still() const noexcept;
+  void skip(std::int64_t until) noexcept;
   void moveActuators(std::int64_t to) noexcept;
   void readTransducers() noexcept;
   void look() noexcept;

@@ -21,25 +21,30 @@ struct RunResult {
   Phase phase = Phase::kDisarmed;
   Check cause = Check::kCount;  // of a stop; or why it never armed
   std::int64_t cause_tick = -1;
-  std::int64_t lost = 0;  // [-] log events and messages that could not be written or sent
+  bool uncalibrated = false;  // the last calibration was refused
+  bool let_go = false;        // asked to end before it was armed, or after a stop was reset
+  std::int64_t lost = 0;      // [-] log events and messages that could not be written or sent
 
-  bool good() const { return phase == Phase::kParked; }
+  bool good() const { return (phase == Phase::kParked && !uncalibrated) || let_go; }
 };
 
-/// Called after every tick; may ask for the program's end.
-using Watch = std::function<Request(const TickState&)>;
+/// Called after every tick; may give an order. An order for a segment needs no id here.
+using Watch = std::function<Order(const TickState&)>;
 
 inline constexpr const char* kVersion = "0.1.0";
 
 experiment_t describe(const Experiment& experiment, const Identity& from, std::int64_t time);
 
 /// The experiment in one process without a bus, as fast as it goes; bit-identical for one seed.
-RunResult runLockstep(const Experiment& experiment, LogWriter* log, const Watch& watch);
+/// `first` is the order of the first tick.
+RunResult runLockstep(const Experiment& experiment, LogWriter* log, const Watch& watch,
+                      Request first = Request::kStart);
 
 struct ProcessOptions {
   std::string url = kDefaultUrl;
   bool lockstep = false;
   bool realtime = false;  // insist on SCHED_FIFO and locked memory
+  bool start = false;     // the program at once; else the controller waits for orders
   std::string log;        // file, empty: none
 };
 

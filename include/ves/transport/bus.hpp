@@ -42,6 +42,8 @@ class Bus {
 
   /// Hands out all that has arrived.
   void drain() noexcept;
+  /// Readable when a message has arrived.
+  int descriptor() noexcept { return lcm_.getFileno(); }
   /// Waits for one message; false when none came in time.
   bool wait(int milliseconds) noexcept;
 
@@ -67,7 +69,7 @@ bool busWorks(const std::string& url);
 /// multicast: nothing leaks out or in. Call before any thread starts. Throws InputError.
 void enterPrivateBus();
 
-/// The controller's side: the newest sample, the operator's wish, whether somebody else is there.
+/// The controller's side: the newest sample, the operator's orders, whether somebody else is there.
 ///
 /// A machine that was started anew takes the place of the old one while nothing is engaged. From
 /// then on the machine is the machine: samples of another are not let in and count as a rival.
@@ -78,7 +80,9 @@ class ControllerLink {
   const Sample& sample() const noexcept { return sample_; }
   std::int64_t answers() const noexcept { return answers_; }  // lockstep: tick the sample answers
   std::int64_t sampleTime() const noexcept { return sample_time_; }  // [ns] sender's clock
-  Request takeRequest() noexcept { return std::exchange(request_, Request::kNone); }
+  /// The oldest order that waits; none when none does. An order that is repeated, because its
+  /// sender saw no answer, counts once; a stop goes before what waits.
+  Order takeOrder() noexcept;
   bool takeRival() noexcept { return std::exchange(rival_, false); }
   std::int64_t rejected() const noexcept { return rejected_; }  // [-] messages not let in
 
@@ -92,7 +96,13 @@ class ControllerLink {
   std::int64_t sample_time_ = 0;
   Identity plant_;
   bool engaged_ = false;
-  Request request_ = Request::kNone;
+  void receiveOrder(const operator_t& message) noexcept;
+
+  static constexpr std::size_t kOrders = 16;
+  std::array<Order, kOrders> orders_{};  // that wait, oldest first
+  std::size_t waiting_ = 0;
+  std::array<OrderId, kOrders> known_{};  // taken before, in a ring
+  std::size_t next_known_ = 0;
   bool rival_ = false;
   std::int64_t rejected_ = 0;
 };

@@ -34,12 +34,14 @@ sample_t toMessage(const Sample& sample, const Identity& from, std::int64_t answ
 leg_command_t toMessage(const LegCommand& command, const header_t& header) noexcept;
 state_t toMessage(const TickState& state, const TickInput& in, const header_t& header) noexcept;
 truth_t toMessage(const plant::Truth& truth, const header_t& header) noexcept;
+/// `controller` is the header.source of the states of the one that is meant.
+operator_t toMessage(const Order& order, std::int64_t controller, const header_t& header) noexcept;
 
 /// Nothing when a value is out of range or not a number.
 std::optional<Sample> fromMessage(const sample_t& message) noexcept;
 std::optional<LegCommand> fromMessage(const leg_command_t& message) noexcept;
 std::optional<plant::RobotMove> fromMessage(const robot_command_t& message) noexcept;
-std::optional<Request> fromMessage(const operator_t& message) noexcept;
+std::optional<Order> fromMessage(const operator_t& message) noexcept;
 
 /// Decodes bytes of one message; nothing when they are not exactly that.
 template <typename Message>

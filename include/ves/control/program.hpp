@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// What testPlatform can be told to do: the items of its menu, a program of them, orders.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+
+#include "ves/control/trajectory_generation.hpp"
+
+namespace ves {
+
+enum class SegmentKind : std::int32_t {
+  kCalibration,  // hold until still, and take the bias of the sensor
+  kMove,         // brakes if it must, then gently to rest at a pose
+  kTrajectory,
+  kAdmittance,  // from wherever the platform is, as the model's state at rest
+  kWatch,       // hold, for a look at the sensor every interval
+  kCount
+};
+
+std::string_view name(SegmentKind kind) noexcept;
+
+/// One item of testPlatform's menu.
+struct Segment {
+  SegmentKind kind = SegmentKind::kTrajectory;
+  double duration = 0.0;    // [s] of a move: 0 for as long as is gentle
+  Pose target;              // of a move, from home
+  Trajectory trajectory{};  // of a trajectory
+  double interval = 0.0;    // [s] of a watch, from one look to the next
+};
+
+inline constexpr int kMaxSegments = 64;
+
+struct Program {
+  int size = 0;
+  std::array<Segment, kMaxSegments> segments{};
+};
+
+/// A calibration takes so many samples, and so does each look of a watch.
+inline constexpr int kCalibrationSamples = 100;  // [-] per channel
+
+enum class Request : std::int32_t {
+  kNone,
+  kStart,  // take the legs, run the program, come home
+  kStop,   // brake, come home gently, let go
+  kArm,    // take the legs and hold; orders will follow
+  kRun,    // the order's segment
+  kHold,   // brake and hold here
+  kTare,   // what the sensor feels now counts as nothing
+  kReset,  // out of a stop, back to disarmed
+  kCount
+};
+
+std::string_view name(Request request) noexcept;
+
+/// Why an order was not taken.
+enum class Refusal : std::int32_t {
+  kNone,
+  kNotArmed,      // the legs are not ours
+  kBusy,          // something else is running: hold first
+  kArmed,         // the legs are ours already
+  kNotStopped,    // nothing to leave
+  kCauseRemains,  // a check still fails
+  kCount
+};
+
+std::string_view name(Refusal refusal) noexcept;
+
+/// Who gave an order, and its number: where the segment of a kRun is to be found again.
+struct OrderId {
+  std::int64_t source = 0;
+  std::int64_t sequence = -1;  // [-] -1: given without a message
+};
+
+struct Order {
+  Request request = Request::kNone;
+  Segment segment;  // of kRun
+  OrderId id;
+};
+
+}  // namespace ves

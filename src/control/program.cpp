@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/control/program.hpp"
+
+namespace ves {
+
+std::string_view name(SegmentKind kind) noexcept {
+  switch (kind) {
+    case SegmentKind::kCalibration: return "calibration";
+    case SegmentKind::kMove: return "move";
+    case SegmentKind::kTrajectory: return "trajectory";
+    case SegmentKind::kAdmittance: return "admittance";
+    case SegmentKind::kWatch: return "watch";
+    case SegmentKind::kCount: break;
+  }
+  return "none";
+}
+
+std::string_view name(Request request) noexcept {
+  switch (request) {
+    case Request::kNone: return "none";
+    case Request::kStart: return "start";
+    case Request::kStop: return "stop";
+    case Request::kArm: return "arm";
+    case Request::kRun: return "run";
+    case Request::kHold: return "hold";
+    case Request::kTare: return "tare";
+    case Request::kReset: return "reset";
+    case Request::kCount: break;
+  }
+  return "unknown";
+}
+
+std::string_view name(Refusal refusal) noexcept {
+  switch (refusal) {
+    case Refusal::kNone: return "not refused";
+    case Refusal::kNotArmed: return "the legs are not armed";
+    case Refusal::kBusy: return "something else is running";
+    case Refusal::kArmed: return "already armed";
+    case Refusal::kNotStopped: return "there is no stop to leave";
+    case Refusal::kCauseRemains: return "a safety check still fails";
+    case Refusal::kCount: break;
+  }
+  return "unknown";
+}
+
+}  // namespace ves
