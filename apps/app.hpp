@@ -48,6 +48,7 @@ struct Options {
   std::string scenario;
   std::vector<std::string> overrides;
   std::int64_t seed = -1;
+  std::string calibration;
   bool private_bus = false;
   ProcessOptions process;
 
@@ -56,6 +57,7 @@ struct Options {
     cli.add_option("--set", overrides, "KEY.PATH=VALUE as if it stood in the scenario")
         ->allow_extra_args(false);
     cli.add_option("--seed", seed, "of the plant's noise")->check(CLI::Range(0, INT32_MAX));
+    cli.add_option("--calibration", calibration, "file that a calibration has left");
   }
   void addBus(CLI::App& cli) {
     cli.add_option("--url", process.url, "LCM bus")->capture_default_str();
@@ -68,7 +70,7 @@ struct Options {
     const char* config = std::getenv("VES_CONFIG_DIR");
     std::vector<std::string> all = overrides;
     if (seed >= 0) all.push_back(fmt::format("seed={}", seed));
-    return loadExperiment(findScenario(scenario, config ? config : "config"), all);
+    return loadExperiment(findScenario(scenario, config ? config : "config"), all, calibration);
   }
 };
 
@@ -92,6 +94,10 @@ inline int run(CLI::App& cli, int argc, char** argv, const std::function<int()>&
 inline void printWarnings(const Experiment& experiment) {
   for (const std::string& warning : experiment.warnings)
     fmt::print(stderr, "warning: {}\n", warning);
+  if (experiment.calibration && age(*experiment.calibration) > kCalibrationKeeps)
+    fmt::print(
+        stderr, "warning: the calibration of {} is {:.1f} h old; its bias drifts, and keeps {} h\n",
+        dateText(experiment.calibration->date), age(*experiment.calibration), kCalibrationKeeps);
 }
 
 }  // namespace ves::app

@@ -30,12 +30,8 @@ int main(int argc, char** argv) {
     const Series series = readSeries(log);
     std::vector<Column> chosen;
     std::vector<bool> used(select.size(), false);
-    for (const Column& column : columns(series.experiment)) {
-      bool take = select.empty() || column.name == "t_s";
-      for (std::size_t i = 0; i < select.size(); ++i)
-        if (column.name.rfind(select[i], 0) == 0) take = used[i] = true;
-      if (take) chosen.push_back(column);
-    }
+    for (const Column& column : columns(series.experiment))
+      if (selected(column.name, select, used)) chosen.push_back(column);
     for (std::size_t i = 0; i < select.size(); ++i)
       if (!used[i])
         throw InputError(

@@ -1,32 +1,99 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// ves controller: testPlatform as a process of its own.
-#include "app.hpp"
+// ves controller: testPlatform, with its menu or as a process that takes its orders from the bus.
+#include <unistd.h>
+
+#include "runner.hpp"
+#include "ves/console/console.hpp"
+
+namespace ves::app {
+namespace {
+
+struct ControllerOptions : RunnerOptions {
+  std::vector<std::string> commands;
+  bool no_menu = false;
+  bool plant = false;
+};
+
+/// One process, no terminal.
+int serve(ControllerOptions& options) {
+  if (options.private_bus) enterPrivateBus();
+  catchSignals();
+  const RunResult result = runController(options.load(), options.process, [](const TickState&) {
+    return stop_requested ? Order{Request::kStop, {}, {}} : Order();
+  });
+  if (result.good()) return kDone;
+  if (result.phase == Phase::kDisarmed)
+    fmt::print(stderr, "ves controller: not armed: {}\n", name(result.cause));
+  else if (result.phase == Phase::kStopped)
+    fmt::print(stderr, "ves controller: stopped by the {} check in tick {}\n", name(result.cause),
+               result.cause_tick);
+  return kTripped;
+}
+
+/// The calibration of an earlier session, when it fits and none was named.
+std::filesystem::path findCalibration(ControllerOptions& options) {
+  const std::filesystem::path kept = "ves-runs/calibration.yaml";
+  std::error_code error;
+  if (!options.calibration.empty() || !std::filesystem::exists(kept, error)) return kept;
+  const Value document = loadDocument(kept);
+  const CalibrationRecord record = readCalibration(Section(document, ""));
+  if (record.setup == options.load().setup)
+    options.calibration = kept.string();
+  else
+    fmt::print(stderr, "warning: {} is of another sensor, robot or gravity: not used\n",
+               kept.string());
+  return kept;
+}
+
+int console(ControllerOptions& options) {
+  ConsoleOptions console;
+  console.calibration = findCalibration(options);
+  if (!options.calibration.empty()) console.calibration = options.calibration;
+  console.commands = options.commands;
+  console.stop = [] { return stop_requested != 0; };
+  const Experiment experiment = options.load();
+  printWarnings(experiment);
+  catchSignals();
+  prepareBus(options, options.plant);
+  console.launch = prepareFolder(options, experiment);
+  console.launch.plant = options.plant;
+  fmt::print("{}: {}\n", experiment.name, experiment.description);
+  bool failed = false;
+  const RunResult result = runConsole(experiment, console, failed);
+  fmt::print("{}", writeOutcome(console.launch.scenario.parent_path(), result, options.plots));
+  return result.good() && !failed ? kDone : kTripped;
+}
+
+}  // namespace
+}  // namespace ves::app
 
 int main(int argc, char** argv) {
   using namespace ves;
   CLI::App cli(
-      "The controller (testPlatform) as a process: runs a scenario's program against the "
-      "machine on the bus.",
+      "The controller (testPlatform). On a terminal, or with --do: its menu, over a controller "
+      "process that it starts and records. Otherwise that process alone, which takes orders from "
+      "the bus (VES_OPERATOR) and moves nothing without one.",
       "ves controller");
-  app::Options options;
+  app::ControllerOptions options;
   options.addExperiment(cli);
   options.addBus(cli);
-  cli.add_flag("--start", options.process.start, "run the scenario's program at once");
-  cli.add_option("--log", options.process.log, "record samples, states and commands (lockstep)");
+  options.addOut(cli);
+  cli.add_option("--do", options.commands,
+                 "a line of the menu, as 'trajectory 3 z sine 200 0.5'; again for the next; then "
+                 "home")
+      ->allow_extra_args(false);
+  cli.add_flag("--plant", options.plant, "start a plant too");
+  cli.add_flag("--start", options.process.start, "run the scenario's program at once; no menu");
+  cli.add_flag("--no-menu", options.no_menu, "wait for orders from the bus");
+  cli.add_option("--log", options.process.log,
+                 "record samples, states and commands (--lockstep, no menu)");
+  cli.add_flag("!--no-plots", options.plots, "leave the plots out");
   return app::run(cli, argc, argv, [&] {
-    if (options.private_bus) enterPrivateBus();
-    app::catchSignals();
-    const Experiment experiment = options.load();
-    const RunResult result = runController(experiment, options.process, [](const TickState&) {
-      return app::stop_requested ? Order{Request::kStop, {}, {}} : Order();
-    });
-    if (result.good()) return app::kDone;
-    if (result.phase == Phase::kDisarmed)
-      fmt::print(stderr, "ves controller: not armed: {}\n", name(result.cause));
-    else
-      fmt::print(stderr, "ves controller: stopped by the {} check in tick {}\n", name(result.cause),
-                 result.cause_tick);
-    return app::kTripped;
+    const bool alone = options.no_menu || options.process.start || options.process.lockstep;
+    if (!options.commands.empty() && alone)
+      throw InputError("--do: not with --no-menu, --start or --lockstep");
+    return alone || (options.commands.empty() && !isatty(STDIN_FILENO)) ? app::serve(options)
+                                                                        : app::console(options);
   });
 }

@@ -28,12 +28,14 @@ int main(int argc, char** argv) {
     }
     Phase phase = Phase::kDisarmed;
     std::int32_t segment = -1;
+    SegmentKind kind = SegmentKind::kCount;
     const ReplayResult r = replay(log, options, [&](const TickState& state) {
-      if (state.phase == phase && state.segment == segment) return;
+      if (state.phase == phase && state.segment == segment && state.kind == kind) return;
       phase = state.phase;
       segment = state.segment;
+      kind = state.kind;
       fmt::print("  tick {:>7}  {}{}\n", state.tick, name(phase),
-                 phase == Phase::kRunning ? fmt::format(", segment {}", segment + 1) : "");
+                 phase == Phase::kRunning ? fmt::format(": {}", name(kind)) : "");
     });
     fmt::print("{}: {} (configuration {}, version {}), {} ticks replayed\n", log, r.name, r.hash,
                r.version, r.ticks);

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// What `run` and `demo` do: an experiment from start to its folder of results.
+// What `run`, `demo` and `controller` share: an experiment from start to its folder of results.
 #pragma once
 
 #include <fmt/chrono.h>
+
 #include <fstream>
 
 #include "app.hpp"
@@ -18,6 +19,10 @@ struct RunnerOptions : Options {
   std::string out;
   bool two_processes = false;
   bool plots = true;
+
+  void addOut(CLI::App& cli) {
+    cli.add_option("--out", out, "folder for the results; a new one in ves-runs by default");
+  }
 };
 
 inline void writeFile(const std::filesystem::path& file, const std::string& text) {
@@ -27,21 +32,42 @@ inline void writeFile(const std::filesystem::path& file, const std::string& text
   if (!out) throw InputError(file.string() + ": cannot be written");
 }
 
-inline int runExperiment(RunnerOptions& options) {
-  const Experiment experiment = options.load();
-  printWarnings(experiment);
+/// The folder of the results, and in it the resolved experiment for the processes to read.
+inline LaunchOptions prepareFolder(RunnerOptions& options, const Experiment& experiment) {
   if (options.out.empty())
     options.out = fmt::format("ves-runs/{}-{:%Y%m%d-%H%M%S}", experiment.name,
                               fmt::localtime(std::time(nullptr)));
   const std::filesystem::path folder = makeFolder(options.out);
-  const std::filesystem::path log = folder / "run.lcmlog", resolved = folder / "experiment.yaml";
-  writeFile(resolved, experiment.resolved);
+  LaunchOptions launch;
+  launch.programs = std::filesystem::read_symlink("/proc/self/exe").parent_path();
+  launch.scenario = folder / "experiment.yaml";
+  writeFile(launch.scenario, experiment.resolved);
+  options.process.log = (folder / "run.lcmlog").string();
+  launch.process = options.process;
+  return launch;
+}
+
+/// A bus that works; `alone`: nobody else needs to be on it.
+inline void prepareBus(RunnerOptions& options, bool alone) {
+  if (alone && !options.private_bus && !busWorks(options.process.url)) {
+    fmt::print(stderr, "multicast does not come back on this machine: using a private bus\n");
+    options.private_bus = true;
+  }
+  if (options.private_bus) enterPrivateBus();
+  // Asked here first, so that a refusal is said once.
+  if (options.process.realtime) claimRealtime(kRecorderPriority, true);
+}
+
+inline int runExperiment(RunnerOptions& options) {
+  const Experiment experiment = options.load();
+  printWarnings(experiment);
+  LaunchOptions launch = prepareFolder(options, experiment);
   catchSignals();
 
   Progress progress(experiment);
   RunResult result;
   if (options.process.lockstep && !options.two_processes) {
-    LogWriter writer(log.string());
+    LogWriter writer(launch.process.log);
     result = runLockstep(experiment, &writer, [&](const TickState& state) {
       double x[6];
       Vec6::Map(x) = state.motion.x;
@@ -49,16 +75,8 @@ inline int runExperiment(RunnerOptions& options) {
       return stop_requested ? Order{Request::kStop, {}, {}} : Order();
     });
   } else {
-    if (!options.private_bus && !busWorks(options.process.url)) {
-      fmt::print(stderr, "multicast does not come back on this machine: using a private bus\n");
-      options.private_bus = true;
-    }
-    if (options.private_bus) enterPrivateBus();
-    // Asked here first, so that a refusal is said once.
-    if (options.process.realtime) claimRealtime(kRecorderPriority, true);
-    LaunchOptions launch{options.process,
-                         std::filesystem::read_symlink("/proc/self/exe").parent_path(), resolved};
-    launch.process.log = log.string();
+    prepareBus(options, true);
+    launch.process.start = true;
     result = runProcesses(
         experiment, launch,
         [&](const state_t& s) {
@@ -67,7 +85,7 @@ inline int runExperiment(RunnerOptions& options) {
         [] { return stop_requested != 0; });
   }
   progress.end();
-  fmt::print("{}", writeOutcome(folder, result, options.plots));
+  fmt::print("{}", writeOutcome(launch.scenario.parent_path(), result, options.plots));
   return result.good() ? kDone : kTripped;
 }
 

@@ -32,6 +32,9 @@ const std::map<std::string, Names> kMayInclude = {
      {"math", "kinematics", "robot", "control", "plant", "config", "transport", "realtime"}},
     {"report",
      {"math", "kinematics", "robot", "control", "plant", "config", "transport", "realtime", "run"}},
+    {"console",
+     {"math", "kinematics", "robot", "control", "plant", "config", "transport", "realtime", "run",
+      "report"}},
 };
 
 const Names kPure = {"math", "kinematics", "robot", "control"};

@@ -1,133 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// The programs as a person or a script meets them: exit statuses, messages, files, two processes.
-#include <gtest/gtest.h>
-#include <signal.h>
-#include <sys/wait.h>
-#include <unistd.h>
+// Exit statuses, messages, files, two processes.
+#include "support/programs.hpp"
 
-#include <array>
-#include <filesystem>
-#include <fstream>
-#include <nlohmann/json.hpp>
-
-#include "ves/transport/bus.hpp"
-#include "ves/transport/channels.hpp"
-#include "ves/transport/event_log.hpp"
+#include <set>
 
 namespace ves {
 namespace {
 
+using test::Output;
+using test::sh;
 namespace fs = std::filesystem;
 
-struct Output {
-  int status;
-  std::string text;  // both streams
-};
-
-Output sh(const std::string& command) {
-  Output out{-1, ""};
-  std::FILE* pipe = popen(("( " + command + " ) 2>&1 </dev/null").c_str(), "r");
-  std::array<char, 4096> buffer;
-  while (std::size_t n = fread(buffer.data(), 1, buffer.size(), pipe))
-    out.text.append(buffer.data(), n);
-  const int status = pclose(pipe);
-  out.status = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-  return out;
-}
-
-class Programs : public testing::Test {
- protected:
-  void SetUp() override {
-    setenv("VES_CONFIG_DIR", VES_TEST_CONFIG_DIR, 1);
-    folder_ =
-        fs::temp_directory_path() / ("ves_programs_" + std::to_string(getpid()) +
-                                     testing::UnitTest::GetInstance()->current_test_info()->name());
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
-  static std::string app(const std::string& name) {
-    return std::string(VES_TEST_APP_DIR) + "/ves-" + name + " ";
-  }
-  Output run(const std::string& arguments) { return sh(app("run") + arguments); }
-  std::string out(const std::string& name) { return " --out " + (folder_ / name).string() + " "; }
-
-  static nlohmann::json summary(const fs::path& folder) {
-    std::ifstream in(folder / "summary.json");
-    return nlohmann::json::parse(in);
-  }
-  /// Commands of a log, in order.
-  static std::vector<std::array<std::int32_t, 8>> commands(const fs::path& folder) {
-    std::vector<std::array<std::int32_t, 8>> all;
-    LogReader reader((folder / "run.lcmlog").string());
-    LogEvent event;
-    while (reader.next(event))
-      if (event.channel == channel::kLegCommand) {
-        const auto m = event.as<leg_command_t>();
-        all.push_back({m->counts[0], m->counts[1], m->counts[2], m->counts[3], m->counts[4],
-                       m->counts[5], m->engaged, m->segment});
-      }
-    return all;
-  }
-  // On a loaded machine processes sleep through samples, and sockets overflow. Neither is what
-  // these tests are about: the controller waits longer, and a log with holes is recorded once more.
-  static constexpr const char* kPatience = "safety.stale_ticks=1000";
-  static constexpr const char* kShortProgram =
-      "program=[{calibration: {}},{trajectory: {duration_s: 1, z: {sine: {amplitude_m: 0.02, "
-      "frequency_hz: 1}}}}]";
-  static std::string patient() { return std::string("--set ") + kPatience; }
-
-  static void untilNothingIsLost(const std::function<std::string()>& record) {
-    for (int i = 0; i < 4; ++i) {
-      const Output again = sh(app("replay") + record() + " --check");
-      if (again.text.find("are missing") != std::string::npos ||
-          again.text.find("not in this log") != std::string::npos)
-        continue;
-      EXPECT_EQ(again.status, 0) << again.text;
-      EXPECT_NE(again.text.find("0 of "), std::string::npos) << again.text;
-      return;
-    }
-    ADD_FAILURE() << "four logs with holes";
-  }
-  fs::path folder_;
-};
-
-/// A program that runs beside the test, on the test's own private bus.
-class Child {
- public:
-  explicit Child(const std::vector<std::string>& words) {
-    pid_ = fork();
-    if (pid_ == 0) {
-      std::vector<char*> argv;
-      for (const std::string& w : words) argv.push_back(const_cast<char*>(w.c_str()));
-      argv.push_back(nullptr);
-      if (!freopen("/dev/null", "w", stderr)) _exit(126);
-      execv(argv[0], argv.data());
-      _exit(127);
-    }
-  }
-  ~Child() {
-    if (pid_ > 0) {
-      kill(pid_, SIGKILL);
-      waitpid(pid_, nullptr, 0);
-    }
-  }
-  bool running() {
-    if (pid_ > 0 && waitpid(pid_, &status_, WNOHANG) == pid_) pid_ = 0;
-    return pid_ > 0;
-  }
-  int wait() {
-    if (pid_ > 0) waitpid(pid_, &status_, 0);
-    pid_ = 0;
-    return WIFEXITED(status_) ? WEXITSTATUS(status_) : -1;
-  }
-  void signal(int number) { kill(pid_, number); }
-
- private:
-  pid_t pid_ = 0;
-  int status_ = 0;
-};
+class Programs : public test::Programs {};
 
 TEST_F(Programs, LockstepRunLeavesItsFiles) {
   const Output o = run("z_sine --lockstep --seed 3" + out("a"));
@@ -223,22 +108,22 @@ TEST_F(Programs, LcmLoggerBesideARunReplaysToo) {
   bus.subscribe(channel::kSample, [&](const std::string&, const void* data, std::uint32_t size) {
     if (const auto m = decode<sample_t>(data, size)) sequence = m->header.sequence;
   });
-  const std::string dir = std::string(VES_TEST_APP_DIR) + "/ves-";
   untilNothingIsLost([&] {
     const std::string file = (folder_ / "beside.lcmlog").string();
     fs::remove(file);
-    Child logger({"/usr/bin/lcm-logger", "--quiet", std::string("--lcm-url=") + kDefaultUrl, file});
+    Process logger("/usr/bin/lcm-logger",
+                   {"--quiet", std::string("--lcm-url=") + kDefaultUrl, file});
     // The logger hears us once its file grows.
     for (int i = 0; i < 500 && (!fs::exists(file) || fs::file_size(file) == 0); ++i) {
       bus.publish("VES_HELLO", sample_t{});
       bus.wait(20);
     }
     sequence = -1;
-    Child plant({dir + "plant", "z_sine"});
+    Process plant = start("plant", {"z_sine"});
     while (sequence < 10 && bus.wait(5000)) {
     }
-    Child controller(
-        {dir + "controller", "--start", "z_sine", "--set", kPatience, "--set", kShortProgram});
+    Process controller =
+        start("controller", {"--start", "z_sine", "--set", kPatience, "--set", kShortProgram});
     EXPECT_EQ(controller.wait(), 0);
     plant.signal(SIGTERM);
     EXPECT_EQ(plant.wait(), 0);
@@ -267,13 +152,12 @@ TEST_F(Programs, SecondControllerRefusesToArmAndTheFirstGoesOn) {
     const auto m = decode<state_t>(data, size);
     if (m && m->header.source == first_source) phase = static_cast<Phase>(m->phase);
   });
-  const std::string dir = std::string(VES_TEST_APP_DIR) + "/ves-";
-  Child plant({dir + "plant", "puma_on_table_4_1"});
-  Child first({dir + "controller", "--start", "puma_on_table_4_1", "--set", kPatience});
+  Process plant = start("plant", {"puma_on_table_4_1"});
+  Process first = start("controller", {"--start", "puma_on_table_4_1", "--set", kPatience});
   while (engaged < 50 && bus.wait(10'000)) {
   }
   ASSERT_GE(engaged, 50);
-  Child second({dir + "controller", "--start", "puma_on_table_4_1", "--set", kPatience});
+  Process second = start("controller", {"--start", "puma_on_table_4_1", "--set", kPatience});
   // It gives up after five seconds disarmed; listen meanwhile.
   while (second.running()) bus.wait(100);
   EXPECT_EQ(second.wait(), 1);

@@ -98,8 +98,7 @@ void merge(Value& base, Value over) {
     if (Value* old = base.find(over.keys[i])) {
       merge(*old, std::move(over.children[i]));
     } else {
-      base.keys.push_back(over.keys[i]);
-      base.children.push_back(std::move(over.children[i]));
+      base.put(over.keys[i], std::move(over.children[i]));
     }
   }
 }
@@ -225,6 +224,15 @@ const Value* Value::find(std::string_view key) const {
 
 Value* Value::find(std::string_view key) {
   return const_cast<Value*>(static_cast<const Value*>(this)->find(key));
+}
+
+void Value::put(std::string key, Value value) {
+  if (Value* old = find(key)) {
+    *old = std::move(value);
+    return;
+  }
+  keys.push_back(std::move(key));
+  children.push_back(std::move(value));
 }
 
 Value loadDocument(const std::filesystem::path& path) { return load(path, "", 0); }

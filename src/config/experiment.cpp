@@ -357,6 +357,14 @@ std::string fingerprint(const std::string& text) {
   return fmt::format("{:016x}", hash);
 }
 
+/// What a calibration depends on.
+std::string setupOf(const Value& document) {
+  std::string text;
+  for (const char* key : {"sensor", "robot", "gravity_m_per_s2"})
+    if (const Value* value = document.find(key)) text += emit(*value);
+  return fingerprint(text);
+}
+
 Experiment build(const Value& document) {
   Experiment out;
   Section root(document, "");
@@ -432,6 +440,17 @@ Experiment build(const Value& document) {
         fmt::format("takes legs of {:.4f} to {:.4f} m, want the stroke of {} to {} m", L.minCoeff(),
                     L.maxCoeff(), p.actuator.length_min, p.actuator.length_max));
 
+  out.setup = setupOf(document);
+  if (root.has("calibration")) {
+    Section section = root.section("calibration");
+    out.calibration = readCalibration(section);
+    if (out.calibration->setup != out.setup)
+      section.fail("setup", fmt::format("{} is of another sensor, robot or gravity, want {}; "
+                                        "calibrate again",
+                                        out.calibration->setup, out.setup));
+    c.bias = out.calibration->bias;
+  }
+
   ProgramReader(has_robot ? &urdf : nullptr, out).read(root);
   root.finish();
   out.substitutes = countSubstitutes(document, false);
@@ -443,8 +462,10 @@ Experiment build(const Value& document) {
 }  // namespace
 
 Experiment loadExperiment(const std::filesystem::path& file,
-                          const std::vector<std::string>& overrides) {
+                          const std::vector<std::string>& overrides,
+                          const std::filesystem::path& calibration) {
   Value document = loadDocument(file);
+  if (!calibration.empty()) document.put("calibration", loadDocument(calibration));
   for (const std::string& assignment : overrides) override(document, assignment);
   return build(document);
 }

@@ -43,7 +43,10 @@ TestPlatform::TestPlatform(const ControllerConfig& config)
 const TickState& TestPlatform::tick(const TickInput& in) noexcept {
   readSample(in);
   measureWrench(in.sample);  // force measurement, gravity compensation
-  state_.refusal = obey(in.order);
+  if (in.order.request != Request::kNone) {
+    state_.order = in.order.id;
+    state_.refusal = obey(in.order);
+  }
   choosePhase();
 
   // Admittance model or trajectory generation, then inverse kinematics.

@@ -5,6 +5,8 @@
 
 #include <cstdio>
 
+#include "ves/report/looks.hpp"
+
 namespace ves {
 namespace {
 
@@ -73,12 +75,67 @@ class Page {
 
 bool in(const Row& row, Phase phase) { return row.state.phase == static_cast<int>(phase); }
 
+/// What the sensor reads over hours (figures 4.2 and 4.3).
+std::string driftPage(const std::vector<Look>& looks, const std::string& title) {
+  std::string data = "$looks << EOD\n";
+  for (const Look& look : looks) {
+    data += fmt::format("{} {}", look.t / 3600.0, look.temperature);
+    for (double w : look.wrench) data += fmt::format(" {}", w);
+    data += "\n";
+  }
+  std::string script =
+      "reset\n" + data + "EOD\n" +
+      fmt::format(
+          "set terminal pngcairo noenhanced size 1500,900 font 'DejaVu Sans,12' background "
+          "'#ffffff'\nset output 'drift.png'\n"
+          "set multiplot layout 3,1 title {} font 'DejaVu Sans,13' margins 0.06,0.985,0.07,0.93 "
+          "spacing 0.06,0.06\n"
+          "set grid lc rgb '#cccccc' lw 1 dt 1\nset border 3 lc rgb '#555555'\nset tics nomirror\n"
+          "set key top right horizontal samplen 2 width 3 font 'DejaVu Sans,11'\n"
+          "set xtics 12\nset offsets graph 0,0,0.25,0.05\n",
+          quoted(title));
+  const auto panel = [&](const char* ylabel, const char* xlabel, int first, int count,
+                         const char* const* titles) {
+    script +=
+        fmt::format("set ylabel {} offset 1\nset xlabel {}\nplot ", quoted(ylabel), quoted(xlabel));
+    for (int i = 0; i < count; ++i)
+      script += fmt::format(
+          "{}$looks using 1:{} with linespoints pt 7 ps 0.5 lw 1.5 lc rgb '{}' {}", i ? ", " : "",
+          first + i, kColour[i], titles ? "title " + quoted(titles[i]) : std::string("notitle"));
+    script += "\n";
+  };
+  panel("force [N]", "", 3, 3, kWrench);
+  panel("moment [N m]", "", 6, 3, kWrench + 3);
+  panel("temperature [C]", "time [h]", 2, 1, nullptr);
+  return script + "unset multiplot\nunset output\n";
+}
+
+/// The pictures that gnuplot has drawn.
+std::vector<std::filesystem::path> draw(const std::string& script,
+                                        const std::vector<std::string>& files,
+                                        const std::filesystem::path& folder) {
+  std::FILE* gnuplot = popen("gnuplot", "w");
+  if (gnuplot) {
+    std::fputs(fmt::format("cd {}\n{}", quoted(folder.string()), script).c_str(), gnuplot);
+    pclose(gnuplot);
+  }
+  std::vector<std::filesystem::path> drawn;
+  for (const std::string& file : files) {
+    std::error_code none;
+    if (std::filesystem::exists(folder / file, none)) drawn.push_back(folder / file);
+  }
+  return drawn;
+}
+
 }  // namespace
 
 std::vector<std::filesystem::path> drawPlots(const Series& series,
                                              const std::filesystem::path& folder) {
   if (series.rows.empty()) return {};
   const Experiment& experiment = series.experiment;
+  if (const auto drift = looks(series); drift.size() > 2)
+    return draw(driftPage(drift, experiment.name + ": the sensor's mean over each look"),
+                {"drift.png"}, folder);
   // The program, not the wait before it; wrenches only once the sensor's bias is known.
   Span program{0.0, series.rows.back().t}, calibrated{-1.0, program.to};
   bool waiting = true;
@@ -87,9 +144,7 @@ std::vector<std::filesystem::path> drawPlots(const Series& series,
       program.from = row.t;
       waiting = false;
     }
-    if (in(row, Phase::kRunning) && row.state.segment >= 0 &&
-        experiment.controller.program.segments[static_cast<std::size_t>(row.state.segment)].kind ==
-            SegmentKind::kCalibration)
+    if (row.state.kind == static_cast<int>(SegmentKind::kCalibration))
       calibrated.from = row.t + 2.0 * static_cast<double>(experiment.controller.period) *
                                     kSecondPerNanosecond;  // the bias counts from the next tick
   }
@@ -98,7 +153,7 @@ std::vector<std::filesystem::path> drawPlots(const Series& series,
   const auto name = [](int i, const char* what) {
     return fmt::format("{}_{}_{}", kCoordinate[i], what, i < 3 ? "m" : "rad");
   };
-  std::string script = fmt::format("cd {}\n", quoted(folder.string()));
+  std::string script;
   std::vector<std::string> files;
   const auto finish = [&](const std::string& file, const Page& page) {
     files.push_back(file);
@@ -146,17 +201,7 @@ std::vector<std::filesystem::path> drawPlots(const Series& series,
                 {scaled(fmt::format("leg{}_commanded_m", i), mm), "commanded", kColour[1], true}});
   finish("legs.png", legs);
 
-  std::FILE* gnuplot = popen("gnuplot", "w");
-  if (gnuplot) {
-    std::fputs(script.c_str(), gnuplot);
-    pclose(gnuplot);
-  }
-  std::vector<std::filesystem::path> drawn;
-  for (const std::string& file : files) {
-    std::error_code none;
-    if (std::filesystem::exists(folder / file, none)) drawn.push_back(folder / file);
-  }
-  return drawn;
+  return draw(script, files, folder);
 }
 
 }  // namespace ves

@@ -6,45 +6,57 @@
 
 #include <cmath>
 #include <iterator>
+#include <utility>
 
 #include "ves/transport/channels.hpp"
-#include "ves/transport/event_log.hpp"
 
 namespace ves {
+std::optional<Row> RowMaker::add(const LogEvent& event, const std::string& log) {
+  if (event.channel == channel::kTruth) {
+    const auto truth = event.require<truth_t>(log);
+    truths_.put(truth.header.sequence, truth);
+  } else if (event.channel == channel::kSample) {
+    const auto sample = event.require<sample_t>(log);
+    samples_.put(sample.header.sequence, sample);
+  } else if (event.channel == channel::kTiming && row_) {
+    row_->timing = event.require<timing_t>(log);
+    row_->has_timing = true;
+  } else if (event.channel == channel::kState) {
+    Row row;
+    row.state = event.require<state_t>(log);
+    if (!start_) start_ = row.state.header.time_ns;
+    row.t = static_cast<double>(row.state.header.time_ns - *start_) * kSecondPerNanosecond;
+    const auto take = [&](const auto& from, auto& to, bool& has) {
+      const auto* message = from.find(row.state.sample_sequence);
+      has = message != nullptr;
+      if (message) to = *message;
+    };
+    take(truths_, row.truth, row.has_truth);
+    take(samples_, row.sample, row.has_sample);
+    return std::exchange(row_, row);
+  }
+  return {};
+}
+
 Series readSeries(const std::string& log) {
   Series series;
   bool configured = false;
-  Recent<truth_t> truths;
+  RowMaker rows;
   LogReader reader(log);
   LogEvent event;
   while (reader.next(event)) {
-    if (event.channel == channel::kExperiment) {
-      if (configured) continue;
+    if (event.channel == channel::kExperiment && !configured) {
       const auto message = event.require<experiment_t>(log);
       series.experiment = parseExperiment(message.resolved, log + ":configuration");
       series.version = message.version;
       configured = true;
-    } else if (event.channel == channel::kTruth) {
-      const auto truth = event.require<truth_t>(log);
-      truths.put(truth.header.sequence, truth);
-    } else if (event.channel == channel::kState) {
-      Row row;
-      row.state = event.require<state_t>(log);
-      const truth_t* truth = truths.find(row.state.sample_sequence);
-      row.has_truth = truth != nullptr;
-      if (truth) row.truth = *truth;
-      series.rows.push_back(row);
-    } else if (event.channel == channel::kTiming && !series.rows.empty()) {
-      series.rows.back().timing = event.require<timing_t>(log);
-      series.rows.back().has_timing = true;
     }
+    if (const auto row = rows.add(event, log)) series.rows.push_back(*row);
   }
+  if (const auto row = rows.finish()) series.rows.push_back(*row);
   if (!configured)
     throw InputError(
         fmt::format("{}: no configuration in this log (channel {})", log, channel::kExperiment));
-  for (Row& row : series.rows)
-    row.t = static_cast<double>(row.state.header.time_ns - series.rows[0].state.header.time_ns) *
-            kSecondPerNanosecond;
   return series;
 }
 
@@ -93,7 +105,10 @@ std::vector<Column> columns(const Experiment& experiment) {
     add(fmt::format(
             "{}_{}", experiment.joint_names[static_cast<std::size_t>(i)],
             experiment.controller.payload.robot.link(i).type == JointType::kRevolute ? "rad" : "m"),
-        [=](const Row& r) { return r.has_truth ? r.truth.q[i] : NAN; });
+        [=](const Row& r) { return r.has_sample ? r.sample.q[i] : NAN; });
+  for (int i = 0; i < 6; ++i)
+    add(fmt::format("{}_bias_count", kWrench[i]), [=](const Row& r) { return r.state.bias[i]; });
+  add("temperature_c", [](const Row& r) { return r.has_sample ? r.sample.temperature : NAN; });
   add("tripped_bits", [](const Row& r) { return static_cast<double>(r.state.tripped); });
   add("latched_bits", [](const Row& r) { return static_cast<double>(r.state.latched); });
   add("sample_sequence", [](const Row& r) { return static_cast<double>(r.state.sample_sequence); });
@@ -104,6 +119,14 @@ std::vector<Column> columns(const Experiment& experiment) {
     return r.has_timing ? static_cast<double>(r.timing.compute_ns) * kSecondPerNanosecond : NAN;
   });
   return out;
+}
+
+bool selected(const std::string& name, const std::vector<std::string>& select,
+              std::vector<bool>& used) {
+  bool take = select.empty() || name == "t_s";
+  for (std::size_t i = 0; i < select.size(); ++i)
+    if (name.rfind(select[i], 0) == 0) take = used[i] = true;
+  return take;
 }
 
 std::string csvHeader(const std::vector<Column>& columns) {

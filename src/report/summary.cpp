@@ -3,29 +3,28 @@
 
 #include <fmt/format.h>
 
-#include <utility>
-
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <utility>
+
+#include "ves/report/looks.hpp"
 
 namespace ves {
 namespace {
 
 constexpr const char* kCoordinate[] = {"x", "y", "z", "alpha", "beta", "gamma"};
+constexpr const char* kWrench[] = {"fx", "fy", "fz", "mx", "my", "mz"};
 constexpr double kStill = 0.5;   // [s] without commanded motion: the sensor's filter has settled
 constexpr double kMoved = 1e-6;  // [m | rad] least range of a coordinate that counts as moving
 
 bool running(const Row& row) { return row.state.phase == static_cast<int>(Phase::kRunning); }
 
-const Segment& segmentOf(const Series& series, const Row& row) {
-  return series.experiment.controller.program
-      .segments[static_cast<std::size_t>(std::clamp(row.state.segment, 0, kMaxSegments - 1))];
-}
+SegmentKind kindOf(const Row& row) { return static_cast<SegmentKind>(row.state.kind); }
 
 /// Trajectory and admittance segments: what the experiment is about.
-bool measured(const Series& series, const Row& row) {
-  const SegmentKind kind = segmentOf(series, row).kind;
+bool measured(const Row& row) {
+  const SegmentKind kind = kindOf(row);
   return running(row) && row.has_truth &&
          (kind == SegmentKind::kTrajectory || kind == SegmentKind::kAdmittance);
 }
@@ -55,7 +54,7 @@ struct Tracking {
 void addTracking(const Series& series, nlohmann::ordered_json& out) {
   Tracking tracking[6];
   for (const Row& row : series.rows)
-    if (measured(series, row))
+    if (measured(row))
       for (int i = 0; i < 6; ++i)
         tracking[i].add(row.state.x_due[i], row.truth.x[i], row.state.x_dot[i]);
   for (int i = 0; i < 6; ++i) {
@@ -92,7 +91,7 @@ void addWrench(const Series& series, nlohmann::ordered_json& out) {
                         *std::min_element(row.state.x_dot, row.state.x_dot + 6);
     if (rate != 0.0 || still_since == HUGE_VAL) still_since = row.t;
     if (!running(row)) continue;
-    if (segmentOf(series, row).kind == SegmentKind::kCalibration) {
+    if (kindOf(row) == SegmentKind::kCalibration) {
       calibrated = true;
       continue;
     }
@@ -106,6 +105,47 @@ void addWrench(const Series& series, nlohmann::ordered_json& out) {
   };
   write("still", still);
   write("moving", moving);
+}
+
+/// 4.1.2: how far the sensor drifts, with what, and how much of it a calibration leaves after
+/// hours.
+void addDrift(const Series& series, nlohmann::ordered_json& out) {
+  const std::vector<Look> all = looks(series);
+  if (all.size() < 3) return;
+  out["looks"] = all.size();
+  const auto correlation = [&](int i) {
+    double mean_w = 0.0, mean_t = 0.0, ww = 0.0, tt = 0.0, wt = 0.0;
+    for (const Look& l : all) {
+      mean_w += l.wrench(i) / static_cast<double>(all.size());
+      mean_t += l.temperature / static_cast<double>(all.size());
+    }
+    for (const Look& l : all) {
+      const double w = l.wrench(i) - mean_w, t = l.temperature - mean_t;
+      ww += w * w;
+      tt += t * t;
+      wt += w * t;
+    }
+    return wt / std::sqrt(ww * tt);
+  };
+  const auto residual = [&](int i, double hours) {
+    double most = 0.0;
+    for (const Look& a : all)
+      for (const Look& b : all)
+        if (std::abs(b.t - a.t - 3600.0 * hours) < 60.0)
+          most = std::max(most, std::abs(b.wrench(i) - a.wrench(i)));
+    return most;
+  };
+  for (int i = 0; i < 6; ++i) {
+    const auto [low, high] = std::minmax_element(
+        all.begin(), all.end(),
+        [i](const Look& a, const Look& b) { return a.wrench(i) < b.wrench(i); });
+    const std::string name = std::string(kWrench[i]) + "_drift_";
+    const char* unit = i < 3 ? "n" : "nm";
+    out[name + "peak_to_peak_" + unit] = high->wrench(i) - low->wrench(i);
+    out[name + "after_3h_max_" + unit] = residual(i, 3.0);
+    out[name + "after_4h_max_" + unit] = residual(i, 4.0);
+    out[name + "temperature_correlation"] = correlation(i);
+  }
 }
 
 void addTiming(const Series& series, nlohmann::ordered_json& out) {
@@ -160,6 +200,7 @@ nlohmann::ordered_json summarise(const Series& series, const RunResult& result) 
   out["real_time_factor"] = result.wall > 0.0 ? result.simulated / result.wall : 0.0;
   addTracking(series, out);
   addWrench(series, out);
+  addDrift(series, out);
   addTiming(series, out);
   return out;
 }
@@ -213,6 +254,19 @@ std::string table(const nlohmann::ordered_json& s) {
       out +=
           fmt::format("  wrench without gravity, platform {:<7} at most {:8.3f} N, {:8.3f} N m\n",
                       when, number(force), number(fmt::format("dynamic_moment_max_{}_nm", when)));
+  }
+  if (s.contains("looks")) {
+    out += fmt::format("\n  {:<8}{:>16}{:>16}{:>16}{:>24}\n", "drift", "peak to peak", "after 3 h",
+                       "after 4 h", "temperature correlation");
+    for (int i = 0; i < 6; ++i) {
+      const std::string w = kWrench[i], unit = i < 3 ? "n" : "nm";
+      const auto cell = [&](const char* what) {
+        return fmt::format("{:.3f} {:<3}", number(w + what + unit), i < 3 ? "N" : "N m");
+      };
+      out += fmt::format("  {:<8}{:>16}{:>16}{:>16}{:>24.3f}\n", w, cell("_drift_peak_to_peak_"),
+                         cell("_drift_after_3h_max_"), cell("_drift_after_4h_max_"),
+                         number(w + "_drift_temperature_correlation"));
+    }
   }
   if (s.contains("wake_up_late_median_s"))
     out += fmt::format(

@@ -75,8 +75,8 @@ state_t toMessage(const TickState& state, const TickInput& in, const header_t& h
   m.count = state.count;
   m.sample_sequence = state.sample_sequence;
   m.request = static_cast<std::int32_t>(in.order.request);
-  m.order_source = in.order.id.source;
-  m.order_sequence = in.order.id.sequence;
+  m.order_source = state.order.source;
+  m.order_sequence = state.order.sequence;
   m.refusal = static_cast<std::int32_t>(state.refusal);
   m.rival = in.rival ? 1 : 0;
   m.phase = static_cast<std::int32_t>(state.phase);
@@ -148,6 +148,15 @@ truth_t toMessage(const plant::Truth& truth, const header_t& header) noexcept {
   put(truth.legs.L_dot, m.leg_dot);
   put(truth.current, m.current);
   m.legs_agree = truth.legs_agree ? 1 : 0;
+  return m;
+}
+
+robot_command_t toMessage(const plant::RobotMove& move, const header_t& header) noexcept {
+  robot_command_t m;
+  m.header = header;
+  m.joint = move.joint;
+  m.target = move.target;
+  m.duration = move.duration;
   return m;
 }
 

@@ -43,6 +43,8 @@ struct Value {
 
   const Value* find(std::string_view key) const;
   Value* find(std::string_view key);
+  /// Of a map: adds the key, or replaces what it had.
+  void put(std::string key, Value value);
 };
 
 /// Reads a file with everything it is made from, `from` and `urdf` replaced by what they name.
@@ -60,7 +62,9 @@ std::string emit(const Value& document);
 /// A map on its way into a struct: knows its name, counts which keys were asked for.
 class Section {
  public:
+  /// `value` must outlive it.
   Section(const Value& value, std::string path);
+  Section(Value&& value, std::string path) = delete;
 
   bool has(std::string_view key);
 

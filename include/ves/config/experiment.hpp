@@ -3,9 +3,11 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "ves/config/calibration.hpp"
 #include "ves/config/document.hpp"
 #include "ves/control/test_platform.hpp"
 #include "ves/plant/plant.hpp"
@@ -21,14 +23,18 @@ struct Experiment {
   plant::PlantConfig plant;
   std::vector<std::string> joint_names;
   std::vector<std::string> warnings;
+  std::optional<CalibrationRecord> calibration;  // that the bias comes from
+  std::string setup;     // hash of what a calibration depends on: sensor, robot, gravity
   int substitutes = 0;   // [-] numbers that stand in for unknown ones
   std::string resolved;  // YAML with everything inside, URDF too; parseExperiment() reads it back
   std::string hash;      // of `resolved`
 };
 
-/// Reads a scenario file; `overrides` are "key.path=value". Throws InputError.
+/// Reads a scenario file; `overrides` are "key.path=value"; `calibration` is the file of one, or
+/// empty. Throws InputError.
 Experiment loadExperiment(const std::filesystem::path& file,
-                          const std::vector<std::string>& overrides = {});
+                          const std::vector<std::string>& overrides = {},
+                          const std::filesystem::path& calibration = {});
 
 /// Reads back what Experiment::resolved holds; `name` stands for a file name in messages.
 Experiment parseExperiment(const std::string& resolved, const std::string& name);

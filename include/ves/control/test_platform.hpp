@@ -78,7 +78,8 @@ struct TickState {
   Phase phase = Phase::kDisarmed;
   std::int32_t segment = -1;               // [-] of the program, -1 outside it
   SegmentKind kind = SegmentKind::kCount;  // of what runs; kCount: nothing
-  Refusal refusal = Refusal::kNone;        // of this tick's order
+  OrderId order;                           // the last one given
+  Refusal refusal = Refusal::kNone;        // of it
   std::int64_t idle = 0;                   // [-] ticks to come of which nothing is expected
   std::int32_t age = 0;                    // [-] ticks since the sample was new
   Wrench total, fixed, dynamic;    // F_Po_I measured; of gravity (the report's static); difference

@@ -4,10 +4,13 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "ves/config/experiment.hpp"
+#include "ves/transport/event_log.hpp"
 #include "ves/transport/messages.hpp"
 
 namespace ves {
@@ -18,6 +21,8 @@ struct Row {
   state_t state;
   truth_t truth;
   bool has_truth = false;
+  sample_t sample;
+  bool has_sample = false;
   timing_t timing;
   bool has_timing = false;  // real time only
 };
@@ -26,6 +31,21 @@ struct Series {
   Experiment experiment;
   std::string version;
   std::vector<Row> rows;
+};
+
+/// Makes rows of the messages of a log, or of a bus, as they come.
+class RowMaker {
+ public:
+  /// A row is whole when the next state arrives: what belongs to it has been seen by then.
+  std::optional<Row> add(const LogEvent& event, const std::string& log);
+  /// The last one.
+  std::optional<Row> finish() { return std::exchange(row_, std::nullopt); }
+
+ private:
+  Recent<truth_t> truths_;
+  Recent<sample_t> samples_;
+  std::optional<Row> row_;
+  std::optional<std::int64_t> start_;  // [ns] of the first state
 };
 
 /// Throws InputError when the file is no log, or a log without its configuration.
@@ -37,6 +57,11 @@ struct Column {
   std::function<double(const Row&)> value;
 };
 std::vector<Column> columns(const Experiment& experiment);
+
+/// True when the name begins with one of `select`, which is then marked as used; or select is empty.
+/// Time is always taken.
+bool selected(const std::string& name, const std::vector<std::string>& select,
+              std::vector<bool>& used);
 
 /// Lines of a table, without their end.
 std::string csvHeader(const std::vector<Column>& columns);

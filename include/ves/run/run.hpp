@@ -61,6 +61,7 @@ struct LaunchOptions {
   ProcessOptions process;
   std::filesystem::path programs;  // folder of ves-controller and ves-plant
   std::filesystem::path scenario;  // resolved experiment file, for both
+  bool plant = true;               // ours too; else one is on the bus
 };
 
 /// Both as processes; records everything on the bus to options.process.log. `watch` sees the states

@@ -37,6 +37,8 @@ truth_t toMessage(const plant::Truth& truth, const header_t& header) noexcept;
 /// `controller` is the header.source of the states of the one that is meant.
 operator_t toMessage(const Order& order, std::int64_t controller, const header_t& header) noexcept;
 
+robot_command_t toMessage(const plant::RobotMove& move, const header_t& header) noexcept;
+
 /// Nothing when a value is out of range or not a number.
 std::optional<Sample> fromMessage(const sample_t& message) noexcept;
 std::optional<LegCommand> fromMessage(const leg_command_t& message) noexcept;

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// A controller process with everything around it: the bus, the recorder, the plant if it is ours,
+// and the operator's orders.
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "ves/run/process.hpp"
+#include "ves/run/run.hpp"
+
+namespace ves {
+
+class Session {
+ public:
+  using OnState = std::function<void(const state_t&)>;
+  using OnMessage =
+      std::function<void(const std::string& channel, const void* data, std::uint32_t size)>;
+
+  /// Starts the processes. Records everything on the bus to options.process.log, except in
+  /// lockstep, where the controller does: it is the one that misses nothing.
+  Session(const Experiment& experiment, const LaunchOptions& options);
+
+  /// `f` sees every state of our controller.
+  void onState(OnState f) { on_state_ = std::move(f); }
+  /// `f` sees every message on the bus, states included.
+  void onMessage(OnMessage f) { on_message_ = std::move(f); }
+
+  /// Handles what has arrived, waiting for at most so long, or until `descriptor` can be read:
+  /// true when it can. Throws InputError when the plant has ended before the controller.
+  bool listen(int milliseconds, int descriptor = -1);
+
+  bool running() { return controller_->running(); }
+  const std::optional<state_t>& state() const { return state_; }
+
+  /// Sends an order until a state shows that it has been heard: why it was refused, if it was;
+  /// nothing when the controller does not answer.
+  std::optional<Refusal> order(const Order& order);
+
+  /// Asks the simulated robot to move a joint.
+  void moveRobot(const plant::RobotMove& move);
+
+  /// A gentle end, as by Ctrl-C.
+  void interrupt();
+
+  /// Of a controller that has ended. Throws InputError when it did so in disorder.
+  RunResult result();
+
+  std::int64_t recorded() const { return heard_; }  // [-] states
+
+ private:
+  void receive(const std::string& channel, const void* data, std::uint32_t size);
+
+  const Experiment& experiment_;
+  Identity self_ = Identity::draw();
+  Bus bus_;
+  std::unique_ptr<LogWriter> log_;
+  std::int64_t start_;  // [ns]
+  std::unique_ptr<Process> plant_, controller_;
+  bool interrupted_ = false;
+  std::optional<state_t> state_;
+  std::int64_t heard_ = 0;   // [-] states
+  std::int64_t orders_ = 0;  // [-] given
+  RunResult result_;
+  OnState on_state_;
+  OnMessage on_message_;
+};
+
+}  // namespace ves

@@ -1,0 +1,228 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/console/command.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <sstream>
+
+namespace ves {
+namespace {
+
+constexpr const char* kCoordinate[] = {"x", "y", "z", "alpha", "beta", "gamma"};
+constexpr double kMillimetre = 1e-3;  // [m]
+constexpr double kLongest = 1e5;      // [s] of anything
+constexpr double kFastest = 50.0;     // [Hz] of a sine
+
+/// The words of a line, taken one by one.
+class Words {
+ public:
+  explicit Words(const std::string& line) {
+    std::istringstream in(line);
+    std::string word;
+    while (in >> word) words_.push_back(word);
+  }
+  bool empty() const { return next_ == words_.size(); }
+  std::string word(const char* what) {
+    if (empty()) throw InputError(fmt::format("{}: missing", what));
+    return words_[next_++];
+  }
+  double number(const std::string& what, double lo, double hi, const char* unit) {
+    return parseNumber(word(what.c_str()), what, lo, hi, unit);
+  }
+  double seconds(const std::string& what = "seconds", double least = 0.01) {
+    return number(what, least, kLongest, "s");
+  }
+  std::vector<std::string> rest() {
+    std::vector<std::string> out(words_.begin() + static_cast<std::ptrdiff_t>(next_), words_.end());
+    next_ = words_.size();
+    return out;
+  }
+  void end() const {
+    if (!empty()) throw InputError(fmt::format("'{}': one word too many", words_[next_]));
+  }
+
+ private:
+  std::vector<std::string> words_;
+  std::size_t next_ = 0;
+};
+
+int coordinate(const std::string& word) {
+  for (int i = 0; i < 6; ++i)
+    if (word == kCoordinate[i]) return i;
+  throw InputError(fmt::format("'{}', want one of {}", word, fmt::join(kCoordinate, ", ")));
+}
+
+/// A length or an angle within the workspace, in SI.
+double within(Words& words, const std::string& what, int i, const SafetyLimits& limits) {
+  const double unit = i < 3 ? kMillimetre : kDegree;
+  const double reach = (i < 3 ? limits.translation : limits.rotation) / unit;
+  return words.number(what, -reach, reach, i < 3 ? "mm" : "deg") * unit;
+}
+
+Segment trajectory(Words& words, const SafetyLimits& limits) {
+  Segment s;
+  s.kind = SegmentKind::kTrajectory;
+  s.duration = words.seconds();
+  while (!words.empty()) {
+    const int i = coordinate(words.word("coordinate"));
+    const std::string name = kCoordinate[i];
+    Axis& axis = s.trajectory[static_cast<std::size_t>(i)];
+    if (axis.motion != AxisMotion::kHold) throw InputError(name + ": given twice");
+    const std::string motion = words.word((name + ": ramp or sine").c_str());
+    if (motion == "ramp") {
+      axis.motion = AxisMotion::kRamp;
+      axis.final = within(words, name + " ramp", i, limits);
+    } else if (motion == "sine") {
+      axis.motion = AxisMotion::kSine;
+      axis.amplitude = within(words, name + " amplitude", i, limits);
+      axis.frequency = words.number(name + " frequency", 0.0, kFastest, "Hz");
+    } else {
+      throw InputError(fmt::format("{}: '{}', want ramp or sine", name, motion));
+    }
+  }
+  return s;
+}
+
+Segment move(Words& words, const SafetyLimits& limits) {
+  Segment s;
+  s.kind = SegmentKind::kMove;
+  Vec6 target = Vec6::Zero();
+  while (!words.empty()) {
+    const std::string word = words.word("coordinate");
+    if (word == "in") {
+      s.duration = words.seconds("in", 0.1);
+      continue;
+    }
+    const int i = coordinate(word);
+    target(i) = within(words, word, i, limits);
+  }
+  s.target = Pose::from(target);
+  return s;
+}
+
+plant::RobotMove robotMove(Words& words, const Experiment& experiment) {
+  const std::vector<std::string>& names = experiment.joint_names;
+  const std::string joint = words.word("joint");
+  const auto at = std::find(names.begin(), names.end(), joint);
+  if (at == names.end())
+    throw InputError(names.empty()
+                         ? std::string("there is no robot")
+                         : fmt::format("'{}', want one of {}", joint, fmt::join(names, ", ")));
+  plant::RobotMove move;
+  move.joint = static_cast<int>(at - names.begin());
+  const Link& link = experiment.controller.payload.robot.link(move.joint);
+  const bool turns = link.type == JointType::kRevolute;
+  const double unit = turns ? kDegree : kMillimetre;
+  move.target =
+      words.number(joint, link.lower / unit, link.upper / unit, turns ? "deg" : "mm") * unit;
+  move.duration = words.seconds("seconds", 0.1);
+  return move;
+}
+
+Collection collection(Words& words) {
+  Collection c;
+  c.file = words.word("file");
+  if (!words.empty()) c.duration = words.seconds();
+  if (!words.empty()) c.rate = words.number("rate", 1e-4, 1e4, "Hz");
+  c.select = words.rest();
+  return c;
+}
+
+}  // namespace
+
+double parseNumber(const std::string& text, const std::string& what, double lo, double hi,
+                   const char* unit) {
+  double x = NAN;
+  const char* end = text.data() + text.size();
+  const auto [last, error] = std::from_chars(text.data(), end, x);
+  if (error != std::errc() || last != end || !(x >= lo && x <= hi))
+    throw InputError(
+        fmt::format("{}: '{}', want a number in [{:g}, {:g}] {}", what, text, lo, hi, unit));
+  return x;
+}
+
+const std::vector<Item>& menu() {
+  static const std::vector<Item> items = {
+      {Verb::kArm, "arm", "", "take the legs and hold"},
+      {Verb::kProgram, "program", "", "what the scenario says, then home"},
+      {Verb::kAdmittance, "admittance", "SECONDS", "move as the base would"},
+      {Verb::kTrajectory, "trajectory", "SECONDS [COORDINATE ramp TO | sine AMPLITUDE HZ]...",
+       "a ramp or a sine in each coordinate"},
+      {Verb::kMove, "move", "[in SECONDS] [COORDINATE TO]...", "gently to a pose; alone: home"},
+      {Verb::kCalibration, "calibration", "", "the sensor's bias, from 100 samples at rest"},
+      {Verb::kTare, "tare", "", "what the sensor feels now counts as nothing"},
+      {Verb::kRobot, "robot", "JOINT TO SECONDS", "move a joint of the simulated robot"},
+      {Verb::kCollect, "collect", "FILE [SECONDS [HZ [NAME...]]]", "variables to a CSV file"},
+      {Verb::kStatus, "status", "", "where everything is"},
+      {Verb::kHold, "hold", "", "brake and stay"},
+      {Verb::kReset, "reset", "", "out of a stop, back to disarmed"},
+      {Verb::kWait, "wait", "SECONDS", "nothing, for so long"},
+      {Verb::kHelp, "help", "", "this list"},
+      {Verb::kQuit, "quit", "", "home, let go, end"},
+  };
+  return items;
+}
+
+Verb parseVerb(const std::string& word) {
+  std::size_t number = 0;
+  const auto [last, error] = std::from_chars(word.data(), word.data() + word.size(), number);
+  if (error == std::errc() && last == word.data() + word.size() && number >= 1 &&
+      number <= menu().size())
+    return menu()[number - 1].verb;
+  const Item* found = nullptr;
+  std::vector<std::string> words;
+  for (const Item& item : menu()) {
+    words.emplace_back(item.word);
+    if (words.back() == word) return item.verb;
+    if (words.back().rfind(word, 0) != 0) continue;
+    if (found) throw InputError(fmt::format("'{}' is {} or {}", word, found->word, item.word));
+    found = &item;
+  }
+  if (!found) throw InputError(fmt::format("'{}', want one of {}", word, fmt::join(words, ", ")));
+  return found->verb;
+}
+
+Command parseCommand(const std::string& line, const Experiment& experiment) {
+  const SafetyLimits& limits = experiment.controller.safety;
+  Words words(line);
+  Command command;
+  command.verb = parseVerb(words.word("command"));
+  Order& order = command.order;
+  const auto segment = [&](const Segment& s) {
+    order.request = Request::kRun;
+    order.segment = s;
+  };
+  Segment s;
+  switch (command.verb) {
+    case Verb::kArm: order.request = Request::kArm; break;
+    case Verb::kProgram: order.request = Request::kStart; break;
+    case Verb::kAdmittance:
+      s.kind = SegmentKind::kAdmittance;
+      s.duration = words.seconds();
+      segment(s);
+      break;
+    case Verb::kTrajectory: segment(trajectory(words, limits)); break;
+    case Verb::kMove: segment(move(words, limits)); break;
+    case Verb::kCalibration:
+      s.kind = SegmentKind::kCalibration;
+      segment(s);
+      break;
+    case Verb::kTare: order.request = Request::kTare; break;
+    case Verb::kHold: order.request = Request::kHold; break;
+    case Verb::kReset: order.request = Request::kReset; break;
+    case Verb::kQuit: order.request = Request::kStop; break;
+    case Verb::kRobot: command.robot = robotMove(words, experiment); break;
+    case Verb::kCollect: command.collection = collection(words); break;
+    case Verb::kWait: command.wait = words.seconds(); break;
+    case Verb::kStatus:
+    case Verb::kHelp: break;
+  }
+  words.end();
+  return command;
+}
+
+}  // namespace ves

@@ -1,0 +1,520 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/console/console.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <ctime>
+#include <fstream>
+
+#include "ves/console/command.hpp"
+#include "ves/realtime/realtime.hpp"
+#include "ves/report/series.hpp"
+#include "ves/run/session.hpp"
+#include "ves/transport/channels.hpp"
+
+namespace ves {
+namespace {
+
+constexpr const char* kCoordinate[] = {"x", "y", "z", "alpha", "beta", "gamma"};
+constexpr const char* kChannel[] = {"Fx", "Fy", "Fz", "Mx", "My", "Mz"};
+constexpr int kTurn = 50;  // [ms] between looks at what happens
+
+std::string poseText(const double (&x)[6]) {
+  return fmt::format(
+      "x {:+.1f}  y {:+.1f}  z {:+.1f} mm   alpha {:+.2f}  beta {:+.2f}  gamma {:+.2f} deg",
+      x[0] * 1e3, x[1] * 1e3, x[2] * 1e3, x[3] / kDegree, x[4] / kDegree, x[5] / kDegree);
+}
+
+/// Rows of the running collection, into its file.
+class Collector {
+ public:
+  Collector(const Experiment& experiment, const Collection& what) : what_(what) {
+    std::vector<bool> used(what.select.size(), false);
+    for (const Column& column : columns(experiment))
+      if (selected(column.name, what.select, used)) columns_.push_back(column);
+    for (std::size_t i = 0; i < used.size(); ++i)
+      if (!used[i])
+        throw InputError(fmt::format("'{}': no variable's name begins so", what.select[i]));
+    out_.open(what.file);
+    if (!out_) throw InputError(fmt::format("{}: cannot be written", what.file));
+    out_ << csvHeader(columns_) << "\n";
+  }
+
+  /// False when the last row has been taken.
+  bool add(const LogEvent& event) {
+    auto row = maker_.add(event, "bus");
+    if (!row) return true;
+    if (row->t > what_.duration) return false;
+    if (row->t < next_ - kRounding) return true;
+    if (what_.rate > 0.0) next_ += 1.0 / what_.rate;
+    out_ << csvRow(columns_, *row) << "\n";
+    ++rows_;
+    return true;
+  }
+
+  std::string outcome() {
+    out_.flush();
+    return out_ ? fmt::format("collected {} rows of {} variables: {}", rows_, columns_.size(),
+                              what_.file)
+                : fmt::format("{}: could not be written", what_.file);
+  }
+
+ private:
+  static constexpr double kRounding = 0.5e-9;  // [s]
+
+  Collection what_;
+  std::vector<Column> columns_;
+  std::ofstream out_;
+  RowMaker maker_;
+  double next_ = 0.0;
+  std::int64_t rows_ = 0;
+};
+
+class Console {
+ public:
+  Console(const Experiment& experiment, const ConsoleOptions& options)
+      : experiment_(experiment),
+        options_(options),
+        terminal_(options.commands.empty() && isatty(STDIN_FILENO) && isatty(STDOUT_FILENO)),
+        calibration_(experiment.calibration) {
+    for (const std::string& line : options.commands) {
+      try {
+        script_.push_back(parseCommand(line, experiment));
+      } catch (const InputError& error) {
+        throw InputError(fmt::format("--do '{}': {}", line, error.what()));
+      }
+    }
+  }
+
+  RunResult run(bool& failed) {
+    Session session(experiment_, options_.launch);
+    session_ = &session;
+    session.onState([this](const state_t& state) { notice(state); });
+    session.onMessage([this](const std::string& channel, const void* data, std::uint32_t size) {
+      collect(channel, data, size);
+    });
+    if (options_.commands.empty())
+      ask();
+    else
+      obeyScript();
+    if (session.running()) {
+      say("home, and done");
+      session.interrupt();
+    }
+    while (session.running()) session.listen(kTurn);
+    if (collector_) say(collector_->outcome());
+    failed = failed_;
+    return session.result();
+  }
+
+ private:
+  // --- What the person sees ----------------------------------------------------------------------
+
+  /// A line of news; an open prompt is put back below it.
+  void say(const std::string& text) {
+    if (!prompt_.empty()) fmt::print("\r\033[K");
+    fmt::print("{}\n{}", text, prompt_);
+    std::fflush(stdout);
+  }
+
+  void help() {
+    for (std::size_t i = 0; i < menu().size(); ++i)
+      say(fmt::format("  {:>2} {:<13}{}", i + 1, menu()[i].word, menu()[i].what));
+    say("A number, a word or its beginning; lengths in mm, angles in deg. All at once, for "
+        "example:\n"
+        "trajectory 3 z sine 200 0.5, or: move in 4 x 50 beta 4. Ctrl-C: home, and done.");
+  }
+
+  void notice(const state_t& s) {
+    const auto phase = static_cast<Phase>(s.phase);
+    const auto kind = static_cast<SegmentKind>(s.kind);
+    if (phase != phase_ || kind != kind_ || s.segment != segment_) {
+      phase_ = phase;
+      kind_ = kind;
+      segment_ = s.segment;
+      switch (phase) {
+        case Phase::kDisarmed:
+          say(s.tripped ? fmt::format("disarmed; cannot arm: {}", failing(s.tripped)) : "disarmed");
+          break;
+        case Phase::kArmed: say("holding  " + poseText(s.x)); break;
+        case Phase::kRunning:
+          say(s.segment < 0 ? fmt::format("running: {}", name(kind))
+                            : fmt::format("running: {} ({} of {})", name(kind), s.segment + 1,
+                                          experiment_.controller.program.size));
+          break;
+        case Phase::kReturning: say("going home"); break;
+        case Phase::kParked: say("parked, legs at home"); break;
+        case Phase::kStopped:
+          say(fmt::format("STOPPED in tick {} by: {}. The legs hold; `reset` when it is gone.",
+                          s.cause_tick, failing(s.latched)));
+          break;
+      }
+    }
+    const auto status = static_cast<Calibration::Status>(s.calibration);
+    if (status != calibration_status_) {
+      calibration_status_ = status;
+      if (status == Calibration::Status::kDone) keepCalibration(s);
+      if (status == Calibration::Status::kRefused) {
+        failed_ = failed_ || !script_.empty();
+        say(fmt::format("calibration refused: {}; the bias is as before", evidence(s)));
+      }
+    }
+  }
+
+  static std::string failing(std::int32_t bits) {
+    std::string out;
+    const Tripped tripped(static_cast<std::uint32_t>(bits));
+    for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(Check::kCount); ++i)
+      if (tripped.has(static_cast<Check>(i)))
+        out += fmt::format("{}{}", out.empty() ? "" : ", ", name(static_cast<Check>(i)));
+    return out;
+  }
+
+  std::string evidence(const state_t& s) const {
+    const auto i = static_cast<std::size_t>(s.unrest_index);
+    const StillnessLimits& limits = experiment_.controller.stillness;
+    switch (static_cast<Unrest>(s.unrest)) {
+      case Unrest::kLeg:
+        return fmt::format("leg {} moved by {} counts ({} allowed)", i + 1, s.unrest_amount,
+                           limits.leg_counts);
+      case Unrest::kJoint: {
+        const bool known = i < experiment_.joint_names.size();
+        const bool turns =
+            known &&
+            experiment_.controller.payload.robot.link(s.unrest_index).type == JointType::kRevolute;
+        return fmt::format("{} moved by {:.4f} {} ({} allowed)",
+                           known ? experiment_.joint_names[i] : fmt::format("joint {}", i + 1),
+                           s.unrest_amount, turns ? "rad" : "m", limits.joint);
+      }
+      case Unrest::kChannel:
+        return fmt::format("{} scatters by {:.1f} counts ({} allowed): something shakes it",
+                           i < 6 ? kChannel[i] : "a channel", s.unrest_amount, limits.deviation);
+      case Unrest::kNone: break;
+    }
+    return "no stream of new samples";
+  }
+
+  void keepCalibration(const state_t& s) {
+    CalibrationRecord record;
+    record.date = std::time(nullptr);
+    record.setup = experiment_.setup;
+    record.temperature = temperature_;
+    record.bias = Vec6::Map(s.bias);
+    record.deviation = Vec6::Map(s.deviation);
+    record.standard_error = Vec6::Map(s.standard_error);
+    calibration_ = record;
+    std::string table = "calibrated  bias          of a sample  standard error [count]\n";
+    for (int i = 0; i < 6; ++i)
+      table += fmt::format("      {}  {:10.2f}    {:10.2f}    {:10.3f}\n", kChannel[i], s.bias[i],
+                           s.deviation[i], s.standard_error[i]);
+    std::error_code error;
+    std::filesystem::create_directories(options_.calibration.parent_path(), error);
+    std::ofstream file(options_.calibration);
+    file << write(record);
+    file.flush();
+    say(table + (file ? "  kept in " : "  could NOT be written to ") +
+        options_.calibration.string());
+  }
+
+  void status() {
+    if (!session_->state()) {
+      say("nothing heard of the controller yet");
+      return;
+    }
+    const state_t& s = *session_->state();
+    const auto kind = static_cast<SegmentKind>(s.kind);
+    say(fmt::format("  phase      {}{}", name(static_cast<Phase>(s.phase)),
+                    kind == SegmentKind::kCount ? "" : fmt::format(", {}", name(kind))));
+    say("  commanded  " + poseText(s.x));
+    say("  measured   " + poseText(s.x_measured));
+    say(fmt::format(
+        "  wrench     {:+.2f} {:+.2f} {:+.2f} N   {:+.3f} {:+.3f} {:+.3f} N m, gravity "
+        "taken out",
+        s.dynamic[0], s.dynamic[1], s.dynamic[2], s.dynamic[3], s.dynamic[4], s.dynamic[5]));
+    say(calibration_
+            ? fmt::format("  bias       of {}, {:.1f} h old, at {:.1f} C; now {:.1f} C{}",
+                          dateText(calibration_->date), age(*calibration_),
+                          calibration_->temperature, temperature_,
+                          age(*calibration_) > kCalibrationKeeps ? "; calibrate again" : "")
+            : std::string("  bias       none: not calibrated"));
+    say(fmt::format("  checks     {}", s.tripped ? failing(s.tripped) + " failing" : "all pass"));
+    if (timing_)
+      say(fmt::format(
+          "  timing     woke {:.0f} us late, computed {:.0f} us; sample {:.1f} ms old; {} "
+          "ticks missed",
+          static_cast<double>(timing_->late_ns) * 1e-3,
+          static_cast<double>(timing_->compute_ns) * 1e-3,
+          static_cast<double>(timing_->sample_age_ns) * 1e-6, timing_->missed));
+  }
+
+  // --- What the person says ----------------------------------------------------------------------
+
+  bool over() { return options_.stop() || !session_->running(); }
+
+  /// One line of input; nothing at its end, after Ctrl-C, or when the controller has ended.
+  std::optional<std::string> line(const std::string& prompt) {
+    prompt_ = terminal_ ? prompt : "";
+    fmt::print("{}", prompt_);
+    std::fflush(stdout);
+    std::optional<std::string> out;
+    while (!over()) {
+      const std::size_t end = input_.find('\n');
+      if (end != std::string::npos) {
+        out = input_.substr(0, end);
+        input_.erase(0, end + 1);
+        break;
+      }
+      if (!session_->listen(kTurn, STDIN_FILENO)) continue;
+      char buffer[512];
+      const ssize_t n = read(STDIN_FILENO, buffer, sizeof buffer);
+      if (n <= 0) break;
+      input_.append(buffer, static_cast<std::size_t>(n));
+    }
+    if (!out && terminal_) fmt::print("\n");
+    prompt_.clear();
+    return out;
+  }
+
+  using Accept = std::function<void(const std::string&)>;  // throws InputError
+
+  /// The same, with a word for an empty line; asked again until `accept` has nothing to say.
+  std::optional<std::string> answer(const std::string& question, const std::string& otherwise,
+                                    const Accept& accept) {
+    for (;;) {
+      auto text = line(fmt::format("  {} [{}]: ", question, otherwise));
+      if (!text) return text;
+      if (text->find_first_not_of(" \t\r") == std::string::npos) text = otherwise;
+      try {
+        if (accept) accept(*text);
+        return text;
+      } catch (const InputError& error) {
+        say(std::string("    ") + error.what());
+      }
+    }
+  }
+
+  /// Asks for what a bare verb leaves open, coordinate by coordinate, as Appendix C describes.
+  std::optional<std::string> complete(const std::string& word) {
+    const Verb verb = parseVerb(word);
+    const SafetyLimits& limits = experiment_.controller.safety;
+    std::string out = word;
+    const auto add = [&](const std::string& question, const std::string& otherwise,
+                         const Accept& accept = nullptr) {
+      const auto text = answer(question, otherwise, accept);
+      if (text) out += " " + *text;
+      return text.has_value();
+    };
+    const auto between = [](double lo, double hi, const char* unit) {
+      return [=](const std::string& text) { parseNumber(text, "that", lo, hi, unit); };
+    };
+    const auto reach = [&](int i) {
+      return i < 3 ? between(-limits.translation * 1e3, limits.translation * 1e3, "mm")
+                   : between(-limits.rotation / kDegree, limits.rotation / kDegree, "deg");
+    };
+    const auto seconds = between(0.01, 1e5, "s");
+    switch (verb) {
+      case Verb::kAdmittance:
+        if (!add("seconds", "10", seconds)) return {};
+        break;
+      case Verb::kWait:
+        if (!add("seconds", "1", seconds)) return {};
+        break;
+      case Verb::kTrajectory: {
+        if (!add("seconds", "3", seconds)) return {};
+        for (int i = 0; i < 6; ++i) {
+          const std::string c = kCoordinate[i], unit = i < 3 ? "mm" : "deg";
+          const auto motion =
+              answer(fmt::format("{}, now {} {}: hold, ramp or sine", c, now(i), unit), "hold",
+                     [](const std::string& text) {
+                       if (text != "hold" && text != "ramp" && text != "sine")
+                         throw InputError(fmt::format("'{}', want hold, ramp or sine", text));
+                     });
+          if (!motion) return {};
+          if (*motion == "hold") continue;
+          out += " " + c + " " + *motion;
+          if (*motion == "ramp") {
+            if (!add(fmt::format("  {} at the end, {}", c, unit), "0", reach(i))) return {};
+          } else if (!add("  amplitude, " + unit, "0", reach(i)) ||
+                     !add("  frequency, Hz", "0.5", between(0.0, 50.0, "Hz"))) {
+            return {};
+          }
+        }
+        break;
+      }
+      case Verb::kMove:
+        for (int i = 0; i < 6; ++i) {
+          out += fmt::format(" {}", kCoordinate[i]);
+          if (!add(fmt::format("{}, now {} {}", kCoordinate[i], now(i), i < 3 ? "mm" : "deg"), "0",
+                   reach(i)))
+            return {};
+        }
+        break;
+      case Verb::kRobot:
+        if (!add(fmt::format("joint, one of {}", fmt::join(experiment_.joint_names, " ")),
+                 experiment_.joint_names.empty() ? "none" : experiment_.joint_names[0]) ||
+            !add("to, deg or mm", "0", between(-1e4, 1e4, "deg or mm")) ||
+            !add("seconds", "5", seconds))
+          return {};
+        break;
+      case Verb::kCollect:
+        if (!add("file", "collected.csv") || !add("seconds", "10", seconds) ||
+            !add("rows per second", "100", between(1e-4, 1e4, "Hz")) ||
+            !add("variables: beginnings of names, as in series.csv",
+                 "x_ y_ z_ fx_dynamic fy_dynamic fz_dynamic"))
+          return {};
+        break;
+      default: break;
+    }
+    return out;
+  }
+
+  std::string now(int i) const {
+    if (!session_->state()) return "?";
+    const double x = session_->state()->x[i];
+    return i < 3 ? fmt::format("{:+.1f}", x * 1e3) : fmt::format("{:+.2f}", x / kDegree);
+  }
+
+  void ask() {
+    while (!session_->state() && !over()) session_->listen(kTurn);
+    if (terminal_) help();
+    while (!over()) {
+      auto text = line("> ");
+      if (!text) return;
+      if (text->find_first_not_of(" \t\r") == std::string::npos) continue;
+      try {
+        if (terminal_ && text->find(' ') == std::string::npos) {
+          text = complete(*text);
+          if (!text) return;
+        }
+        if (!obey(parseCommand(*text, experiment_))) return;
+      } catch (const InputError& error) {
+        say(error.what());
+        if (!terminal_) failed_ = true;
+      }
+    }
+  }
+
+  // --- What is done about it ---------------------------------------------------------------------
+
+  /// False for the end.
+  bool obey(const Command& command) {
+    switch (command.verb) {
+      case Verb::kHelp: help(); break;
+      case Verb::kStatus: status(); break;
+      case Verb::kCollect:
+        if (collector_) say(collector_->outcome());
+        collector_.emplace(experiment_, command.collection);
+        break;
+      case Verb::kWait: {
+        const std::int64_t until = monotonicNow() + static_cast<std::int64_t>(command.wait * 1e9);
+        while (monotonicNow() < until && !over()) session_->listen(kTurn);
+        break;
+      }
+      case Verb::kRobot: session_->moveRobot(command.robot); break;
+      case Verb::kQuit: return false;
+      default: return give(command);
+    }
+    return true;
+  }
+
+  bool give(const Command& command) {
+    const auto refusal = session_->order(command.order);
+    if (!refusal) {
+      say("the controller does not answer");
+      failed_ = true;
+    } else if (*refusal != Refusal::kNone) {
+      say(fmt::format("not taken: {}{}", name(*refusal), advice(*refusal)));
+      failed_ = failed_ || !script_.empty();
+    } else if (command.verb == Verb::kTare) {
+      say(fmt::format("taking {} samples; then the bias slides over {} s", kCalibrationSamples,
+                      experiment_.controller.tare_ramp));
+    }
+    return true;
+  }
+
+  std::string advice(Refusal refusal) const {
+    switch (refusal) {
+      case Refusal::kNotArmed: return phase_ == Phase::kStopped ? "; reset first" : "; arm first";
+      case Refusal::kBusy: return "; hold first";
+      case Refusal::kCauseRemains: return ": " + failing(session_->state()->tripped);
+      default: return "";
+    }
+  }
+
+  /// One after the other; each waits until what it started is over.
+  void obeyScript() {
+    for (std::size_t i = 0; i < script_.size() && !over() && !failed_; ++i) {
+      say("> " + options_.commands[i]);
+      const bool arms = script_[i].verb == Verb::kArm;
+      if (!obey(script_[i])) return;
+      const auto settled = [&] {
+        const auto& s = session_->state();
+        if (!s) return false;
+        const auto phase = static_cast<Phase>(s->phase);
+        if (phase == Phase::kStopped || phase == Phase::kParked) return true;
+        return phase == Phase::kArmed || (phase == Phase::kDisarmed && !arms);
+      };
+      // A controller that cannot arm says why, and is not waited for.
+      const std::int64_t patience = monotonicNow() + kPatience;
+      while (!over() && !settled()) {
+        session_->listen(kTurn);
+        if (arms && phase_ == Phase::kDisarmed && monotonicNow() > patience) {
+          say("not armed");
+          failed_ = true;
+          break;
+        }
+      }
+      if (phase_ == Phase::kStopped) failed_ = true;
+    }
+    while (collector_ && !over()) session_->listen(kTurn);
+  }
+
+  void collect(const std::string& channel, const void* data, std::uint32_t size) {
+    const auto* bytes = static_cast<const std::uint8_t*>(data);
+    if (channel == channel::kSample) {
+      if (const auto sample = decode<sample_t>(data, size)) temperature_ = sample->temperature;
+    } else if (channel == channel::kTiming) {
+      timing_ = decode<timing_t>(data, size);
+    }
+    if (!collector_) return;
+    event_.channel = channel;
+    event_.data.assign(bytes, bytes + size);
+    try {
+      if (collector_->add(event_)) return;
+      say(collector_->outcome());
+    } catch (const InputError& error) {
+      say(error.what());
+    }
+    collector_.reset();
+  }
+
+  static constexpr std::int64_t kPatience = 5'000'000'000;  // [ns]
+
+  const Experiment& experiment_;
+  const ConsoleOptions& options_;
+  Session* session_ = nullptr;
+  bool terminal_;
+  std::vector<Command> script_;
+  bool failed_ = false;
+  std::string prompt_, input_;
+  Phase phase_ = Phase::kParked;
+  SegmentKind kind_ = SegmentKind::kCount;
+  std::int32_t segment_ = -1;
+  Calibration::Status calibration_status_ = Calibration::Status::kNone;
+  std::optional<CalibrationRecord> calibration_;
+  double temperature_ = NAN;  // [C]
+  std::optional<timing_t> timing_;
+  std::optional<Collector> collector_;
+  LogEvent event_;
+};
+
+}  // namespace
+
+RunResult runConsole(const Experiment& experiment, const ConsoleOptions& options, bool& failed) {
+  return Console(experiment, options).run(failed);
+}
+
+}  // namespace ves

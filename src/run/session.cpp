@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/run/session.hpp"
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <signal.h>
+
+#include <chrono>
+
+#include "ves/realtime/realtime.hpp"
+#include "ves/transport/channels.hpp"
+
+namespace ves {
+namespace {
+
+constexpr int kRepeat = 200;                          // [ms] an order without an answer
+constexpr int kRepeats = 10;                          // [-]
+constexpr std::int64_t kFirstState = 15'000'000'000;  // [ns]
+
+std::int64_t wallClock() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+}  // namespace
+
+Session::Session(const Experiment& experiment, const LaunchOptions& options)
+    : experiment_(experiment), bus_(options.process.url), start_(monotonicNow()) {
+  const ProcessOptions& process = options.process;
+  if (!process.log.empty() && !process.lockstep) {
+    log_ = std::make_unique<LogWriter>(process.log);
+    log_->write(channel::kExperiment, describe(experiment, {}, 0), wallClock());
+  }
+  bus_.subscribe("VES_(SAMPLE|LEG_COMMAND|STATE|TRUTH|TIMING|ROBOT|OPERATOR)",
+                 [this](const std::string& channel, const void* data, std::uint32_t size) {
+                   receive(channel, data, size);
+                 });
+  std::vector<std::string> shared = {options.scenario.string(), "--url", process.url};
+  if (process.lockstep) shared.push_back("--lockstep");
+  if (process.realtime) shared.push_back("--realtime");
+  std::vector<std::string> arguments = shared;
+  arguments.push_back(process.start ? "--start" : "--no-menu");
+  if (process.lockstep && !process.log.empty())
+    arguments.insert(arguments.end(), {"--log", process.log});
+  if (options.plant) plant_ = std::make_unique<Process>(options.programs / "ves-plant", shared);
+  controller_ = std::make_unique<Process>(options.programs / "ves-controller", arguments);
+}
+
+void Session::receive(const std::string& channel, const void* data, std::uint32_t size) {
+  if (log_) log_->write(channel, data, size, wallClock());
+  if (on_message_) on_message_(channel, data, size);
+  if (channel != channel::kState) return;
+  const auto state = decode<state_t>(data, size);
+  if (!state) return;
+  // Ours is the first that began after us.
+  if (!state_ && state->header.epoch < self_.epoch) return;
+  if (state_ && state->header.source != state_->header.source) return;
+  state_ = state;
+  ++heard_;
+  result_.ticks = state->count + 1;
+  result_.simulated =
+      static_cast<double>((state->header.sequence + 1) * experiment_.controller.period) *
+      kSecondPerNanosecond;
+  result_.phase = static_cast<Phase>(state->phase);
+  result_.cause = result_.phase == Phase::kDisarmed
+                      ? Tripped(static_cast<std::uint32_t>(state->tripped)).first()
+                      : static_cast<Check>(state->cause);
+  result_.cause_tick = state->cause_tick;
+  result_.uncalibrated = state->calibration == static_cast<int>(Calibration::Status::kRefused);
+  if (on_state_) on_state_(*state);
+}
+
+bool Session::listen(int milliseconds, int descriptor) {
+  pollfd wait[2] = {{bus_.descriptor(), POLLIN, 0}, {descriptor, POLLIN, 0}};
+  poll(wait, descriptor < 0 ? 1 : 2, milliseconds);
+  bus_.drain();
+  if (plant_ && !plant_->running() && controller_->running()) {
+    interrupt();
+    throw InputError(fmt::format("ves-plant ended early, status {}", plant_->status()));
+  }
+  return descriptor >= 0 && wait[1].revents != 0;
+}
+
+std::optional<Refusal> Session::order(const Order& order) {
+  const std::int64_t until = monotonicNow() + kFirstState;
+  while (!state_ && running() && monotonicNow() < until) listen(kRepeat);
+  if (!state_) return {};
+  const std::int64_t sequence = orders_++;
+  for (int i = 0; i < kRepeats && running(); ++i) {
+    bus_.publish(channel::kOperator,
+                 toMessage(order, state_->header.source, header(self_, sequence, monotonicNow())));
+    const std::int64_t repeat = monotonicNow() + kRepeat * 1'000'000LL;
+    while (monotonicNow() < repeat && running()) {
+      listen(10);
+      if (state_->order_source == self_.source && state_->order_sequence == sequence)
+        return static_cast<Refusal>(state_->refusal);
+    }
+  }
+  return {};
+}
+
+void Session::moveRobot(const plant::RobotMove& move) {
+  bus_.publish(channel::kRobot, toMessage(move, header(self_, orders_++, monotonicNow())));
+}
+
+void Session::interrupt() {
+  if (!std::exchange(interrupted_, true)) controller_->signal(SIGINT);
+}
+
+RunResult Session::result() {
+  bus_.drain();
+  RunResult result = result_;
+  result.wall = static_cast<double>(monotonicNow() - start_) * kSecondPerNanosecond;
+  const int status = controller_->status();
+  if (status != 0 && status != 1)
+    throw InputError(
+        status < 0 ? fmt::format("ves-controller was ended by signal {}; the legs hold", -status)
+                   : fmt::format("ves-controller ended with status {}", status));
+  // The last state may be lost on the way; the exit status is not.
+  if (status == 0 && result.phase == Phase::kDisarmed) result.let_go = true;
+  if (status == 0 && !result.let_go) result.phase = Phase::kParked;
+  if (status == 1 && result.phase == Phase::kParked && !result.uncalibrated)
+    result.phase = Phase::kStopped;
+  result.lost = bus_.failed() + (log_ ? log_->lost() + result.ticks - heard_ : 0);
+  return result;
+}
+
+}  // namespace ves

@@ -1,0 +1,299 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// testPlatform's menu and its words; a calibration kept; controllers that come and go.
+#include <fmt/format.h>
+
+#include <sstream>
+
+#include "support/programs.hpp"
+#include "support/refusal.hpp"
+#include "support/robots.hpp"
+#include "ves/console/command.hpp"
+#include "ves/realtime/realtime.hpp"
+
+namespace ves {
+namespace {
+
+using test::Output;
+using test::sh;
+namespace fs = std::filesystem;
+
+const Experiment& puma() {
+  static const Experiment e =
+      loadExperiment(test::configDir() + "/scenarios/puma_on_table_4_1.yaml");
+  return e;
+}
+
+// --- Words ---------------------------------------------------------------------------------------
+
+TEST(Command, AWordItsBeginningOrItsNumber) {
+  for (std::size_t i = 0; i < menu().size(); ++i) {
+    EXPECT_EQ(parseVerb(menu()[i].word), menu()[i].verb);
+    EXPECT_EQ(parseVerb(std::to_string(i + 1)), menu()[i].verb);
+  }
+  EXPECT_EQ(parseVerb("ad"), Verb::kAdmittance);
+  EXPECT_EQ(parseVerb("tr"), Verb::kTrajectory);
+}
+
+TEST(Command, TrajectoryTakesEachCoordinateInMillimetresAndDegrees) {
+  const Command c = parseCommand("trajectory 3 z sine 200 0.5 gamma ramp -6", puma());
+  EXPECT_EQ(c.order.request, Request::kRun);
+  const Segment& s = c.order.segment;
+  EXPECT_EQ(s.kind, SegmentKind::kTrajectory);
+  EXPECT_EQ(s.duration, 3.0);
+  EXPECT_EQ(s.trajectory[2].motion, AxisMotion::kSine);
+  EXPECT_NEAR(s.trajectory[2].amplitude, 0.2, 1e-15);
+  EXPECT_EQ(s.trajectory[2].frequency, 0.5);
+  EXPECT_EQ(s.trajectory[5].motion, AxisMotion::kRamp);
+  EXPECT_NEAR(s.trajectory[5].final, -6.0 * M_PI / 180.0, 1e-15);
+  for (std::size_t i : {0u, 1u, 3u, 4u}) EXPECT_EQ(s.trajectory[i].motion, AxisMotion::kHold);
+}
+
+TEST(Command, MoveRobotAndCollect) {
+  const Command m = parseCommand("move in 4 x 50 beta 4", puma());
+  EXPECT_EQ(m.order.segment.kind, SegmentKind::kMove);
+  EXPECT_EQ(m.order.segment.duration, 4.0);
+  EXPECT_NEAR(m.order.segment.target.p.x(), 0.05, 1e-15);
+  EXPECT_NEAR(m.order.segment.target.rpy.y(), 4.0 * M_PI / 180.0, 1e-15);
+  const Command r = parseCommand("robot joint_2 -30 1.5", puma());
+  EXPECT_EQ(r.robot.joint, 1);
+  EXPECT_NEAR(r.robot.target, -M_PI / 6.0, 1e-12);
+  const Command c = parseCommand("collect a.csv 5 20 z_ leg1", puma());
+  EXPECT_EQ(c.collection.file, "a.csv");
+  EXPECT_EQ(c.collection.rate, 20.0);
+  EXPECT_EQ(c.collection.select, (std::vector<std::string>{"z_", "leg1"}));
+}
+
+struct BadLine {
+  const char* line;
+  const char* said;
+};
+std::ostream& operator<<(std::ostream& out, const BadLine& b) { return out << b.line; }
+
+class BadLines : public testing::TestWithParam<BadLine> {};
+
+TEST_P(BadLines, AreRefusedByName) {
+  const std::string said = test::refusal([] { parseCommand(GetParam().line, puma()); });
+  EXPECT_NE(said.find(GetParam().said), std::string::npos) << said;
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Lines, BadLines,
+    testing::Values(
+        BadLine{"", "command: missing"}, BadLine{"fly", "'fly', want one of arm, program"},
+        BadLine{"c", "'c' is calibration or collect"}, BadLine{"0", "'0', want one of"},
+        BadLine{"99", "'99', want one of"}, BadLine{"admittance", "seconds: missing"},
+        BadLine{"admittance nan", "seconds: 'nan', want a number in [0.01, 100000] s"},
+        BadLine{"admittance 1e9", "want a number"}, BadLine{"admittance 3 4", "one word too many"},
+        BadLine{"trajectory 3 z", "z: ramp or sine: missing"},
+        BadLine{"trajectory 3 w sine 1 1", "'w', want one of x, y, z"},
+        BadLine{"trajectory 3 z jump 1", "z: 'jump', want ramp or sine"},
+        BadLine{"trajectory 3 z sine 306 1", "[-305, 305] mm"},
+        BadLine{"trajectory 3 alpha ramp 31", "[-30, 30] deg"},
+        BadLine{"trajectory 3 z ramp 1 z ramp 2", "z: given twice"},
+        BadLine{"trajectory 3 z sine 10 0x10", "want a number in [0, 50] Hz"},
+        BadLine{"move x", "x: missing"}, BadLine{"robot joint_7 1 1", "'joint_7', want one of"},
+        BadLine{"robot joint_1 1e3 1", "joint_1: '1e3', want a number in"},
+        BadLine{"collect", "file: missing"}, BadLine{"arm now", "'now': one word too many"}));
+
+// --- A session -----------------------------------------------------------------------------------
+
+class Console : public test::Programs {
+ protected:
+  std::string session(const std::string& commands, const std::string& more = "") {
+    return "cd " + folder_.string() + "; " + app("controller") +
+           "puma_on_table_4_1 --plant --private-bus --no-plots " + patient() + " " + commands +
+           more;
+  }
+};
+
+/// One column of a CSV file by its name, by the tick of the row.
+std::map<long, std::string> column(const fs::path& file, const std::string& name) {
+  std::ifstream in(file);
+  std::string line, cell;
+  std::vector<std::string> names;
+  std::map<long, std::string> out;
+  while (std::getline(in, line)) {
+    std::vector<std::string> cells;
+    std::istringstream row(line);
+    while (std::getline(row, cell, ',')) cells.push_back(cell);
+    if (names.empty()) {
+      names = cells;
+      continue;
+    }
+    const auto at = [&](const std::string& n) {
+      return cells.at(
+          static_cast<std::size_t>(std::find(names.begin(), names.end(), n) - names.begin()));
+    };
+    out[std::stol(at("tick"))] = at(name);
+  }
+  return out;
+}
+
+TEST_F(Console, AScriptCalibratesMovesCollectsAndParks) {
+  const Output o =
+      sh(session("--do arm --do calibration --do 'collect c.csv 1 100 tick fz leg2' "
+                 "--do 'trajectory 1.5 z sine 20 1' --out a"));
+  EXPECT_EQ(o.status, 0) << o.text;
+  EXPECT_NE(o.text.find("kept in ves-runs/calibration.yaml"), std::string::npos) << o.text;
+  EXPECT_EQ(summary(folder_ / "a")["ended"], "parked");
+
+  // The same variables come out of the log.
+  const Output later = sh("cd " + folder_.string() + "; " + app("collect") +
+                          "a/run.lcmlog --select tick fz leg2 --out later.csv");
+  EXPECT_EQ(later.status, 0) << later.text;
+  const auto live = column(folder_ / "c.csv", "leg2_measured_m");
+  const auto logged = column(folder_ / "later.csv", "leg2_measured_m");
+  EXPECT_GT(live.size(), 80u);
+  for (const auto& [tick, value] : live) {
+    ASSERT_TRUE(logged.count(tick)) << tick;
+    EXPECT_EQ(logged.at(tick), value) << tick;
+  }
+  // The calibration serves the next session, until the sensor is another one, or it is old.
+  const fs::path kept = folder_ / "ves-runs/calibration.yaml";
+  const Experiment with =
+      loadExperiment(test::configDir() + "/scenarios/puma_on_table_4_1.yaml", {}, kept);
+  ASSERT_TRUE(with.calibration);
+  EXPECT_EQ(with.controller.bias, with.calibration->bias);
+  EXPECT_LT(age(*with.calibration), 1.0);
+  EXPECT_NE(test::refusal([&] {
+              loadExperiment(test::configDir() + "/scenarios/z_sine.yaml", {}, kept);
+            }).find("calibration.yaml:4: calibration.setup: "),
+            std::string::npos);
+  CalibrationRecord old = *with.calibration;
+  old.date -= 5 * 3600;
+  std::ofstream(kept) << write(old);
+  const Output next = sh(session("--do 'wait 0.1' --out b"));
+  EXPECT_NE(next.text.find("5.0 h old"), std::string::npos) << next.text;
+  EXPECT_EQ(next.status, 0) << next.text;
+}
+
+TEST_F(Console, AScriptStopsAtWhatIsRefused) {
+  const Output o = sh(session("--do 'admittance 1' --do 'move x 10' --out a"));
+  EXPECT_EQ(o.status, 1) << o.text;
+  EXPECT_NE(o.text.find("not taken: the legs are not armed"), std::string::npos) << o.text;
+  EXPECT_EQ(o.text.find("move x 10"), std::string::npos) << o.text;
+}
+
+TEST_F(Console, BadInputIsSaidBeforeAnythingStarts) {
+  for (const char* bad : {"--do 'trajectory 3 z sine 400 1'", "--do fly", "--do arm --start",
+                          "--calibration none.yaml --do arm"}) {
+    const Output o = sh(session(bad));
+    EXPECT_EQ(o.status, 2) << o.text;
+    EXPECT_EQ(o.text.find("VES_"), std::string::npos);
+    EXPECT_FALSE(fs::exists(folder_ / "ves-runs/calibration.yaml"));
+  }
+}
+
+// --- Controllers come and go ---------------------------------------------------------------------
+
+/// What is heard on the bus of the legs and of the controllers.
+struct Witness {
+  Bus bus{kDefaultUrl};
+  std::int64_t engaged = 0, states = 0;
+  std::int64_t controller = 0;
+  Phase phase = Phase::kDisarmed;
+  Vec6 legs = Vec6::Zero();
+
+  Witness() {
+    bus.subscribe("VES_(STATE|LEG_COMMAND|TRUTH)",
+                  [this](const std::string& channel, const void* data, std::uint32_t size) {
+                    if (const auto m = decode<truth_t>(data, size)) legs = Vec6::Map(m->leg);
+                    if (const auto m = decode<leg_command_t>(data, size)) engaged += m->engaged;
+                    if (const auto m = decode<state_t>(data, size)) {
+                      ++states;
+                      controller = m->header.source;
+                      phase = static_cast<Phase>(m->phase);
+                    }
+                    (void)channel;
+                  });
+  }
+  /// Listens until `what` holds; false after half a minute.
+  bool until(const std::function<bool()>& what) {
+    const std::int64_t end = monotonicNow() + 30'000'000'000;
+    while (!what() && monotonicNow() < end) bus.wait(100);
+    return what();
+  }
+  /// Where the legs are once they have stopped: for 40 messages of the plant in a row.
+  Vec6 rest() {
+    Vec6 last = legs;
+    int still = 0;
+    until([&] {
+      still = (legs - last).cwiseAbs().maxCoeff() < 1e-6 ? still + 1 : 0;
+      last = legs;
+      return still > 40;
+    });
+    return legs;
+  }
+};
+
+TEST_F(Console, AKilledControllerLeavesTheLegsWhereTheyAreAndItsSuccessorWaits) {
+  enterPrivateBus();
+  Witness w;
+  Process plant = start("plant", {"z_sine"});
+  {
+    Process first = start("controller", {"z_sine", "--start", "--set", kPatience});
+    ASSERT_TRUE(w.until([&] { return w.phase == Phase::kRunning && w.engaged > 250; }));
+    first.signal(SIGKILL);
+    EXPECT_EQ(first.wait(), -SIGKILL);
+  }
+  const Vec6 held = w.rest();
+  const std::int64_t dead = w.controller, engaged = w.engaged;
+  Process second = start("controller", {"z_sine", "--no-menu"});
+  ASSERT_TRUE(w.until([&] { return w.controller != dead; }));
+  const std::int64_t states = w.states;
+  ASSERT_TRUE(w.until([&] { return w.states > states + 200; }));
+  EXPECT_EQ(w.phase, Phase::kDisarmed);
+  EXPECT_EQ(w.engaged, engaged);
+  EXPECT_LT((w.legs - held).cwiseAbs().maxCoeff(), 0.2e-3);  // counts of 0.07 mm
+  second.signal(SIGINT);
+  EXPECT_EQ(second.wait(), 0);
+}
+
+TEST_F(Console, OrdersOverTheBusAreForOneController) {
+  enterPrivateBus();
+  Witness w;
+  Process plant = start("plant", {"z_sine"});
+  Process controller = start("controller", {"z_sine", "--no-menu", "--set", kPatience});
+  ASSERT_TRUE(w.until([&] { return w.states > 20; }));
+  const Identity me = Identity::draw();
+  const auto order = [&](Request request, std::int64_t to, std::int64_t sequence) {
+    w.bus.publish(channel::kOperator, toMessage({request, {}, {}}, to, header(me, sequence, 0)));
+  };
+  // As a played log would: meant for a controller that is no more.
+  order(Request::kArm, w.controller + 1, 0);
+  std::int64_t states = w.states;
+  ASSERT_TRUE(w.until([&] { return w.states > states + 50; }));
+  EXPECT_EQ(w.phase, Phase::kDisarmed);
+  ASSERT_TRUE(w.until([&] {
+    order(Request::kArm, w.controller, 1);  // again and again: it counts once
+    return w.phase == Phase::kArmed;
+  }));
+  order(Request::kStop, w.controller, 2);
+  while (controller.running()) w.bus.wait(20);
+  EXPECT_EQ(controller.wait(), 0);
+}
+
+TEST_F(Console, LcmLogplayerPlaysSamplesIntoALiveController) {
+  if (sh("command -v lcm-logplayer").status != 0) GTEST_SKIP() << "no lcm-logplayer";
+  enterPrivateBus();
+  const Output recorded = sh(app("run") + "z_sine --no-plots " + patient() + " --set '" +
+                             kShortProgram + "'" + out("a"));
+  ASSERT_EQ(recorded.status, 0) << recorded.text;
+  Witness w;
+  Process controller =
+      start("controller", {"z_sine", "--start", "--set", kPatience, "--set", kShortProgram});
+  Process player("/usr/bin/lcm-logplayer",
+                 {"--regexp", "VES_SAMPLE", (folder_ / "a/run.lcmlog").string()});
+  // The recorded legs do what this controller asks, a little earlier or later: it follows, and
+  // arms, moves and comes home as it did then.
+  EXPECT_TRUE(w.until([&] { return w.phase == Phase::kRunning; }));
+  while (controller.running()) w.bus.wait(20);
+  w.bus.drain();
+  EXPECT_NE(w.phase, Phase::kDisarmed);
+  player.signal(SIGTERM);
+  player.wait();
+}
+
+}  // namespace
+}  // namespace ves
