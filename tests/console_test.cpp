@@ -232,7 +232,7 @@ TEST_F(Console, AKilledControllerLeavesTheLegsWhereTheyAreAndItsSuccessorWaits) 
   Witness w;
   Process plant = start("plant", {"z_sine"});
   {
-    Process first = start("controller", {"z_sine", "--start", "--set", kPatience});
+    Process first = start("controller", {"z_sine", "--start"});
     ASSERT_TRUE(w.until([&] { return w.phase == Phase::kRunning && w.engaged > 250; }));
     first.signal(SIGKILL);
     EXPECT_EQ(first.wait(), -SIGKILL);
@@ -254,7 +254,7 @@ TEST_F(Console, OrdersOverTheBusAreForOneController) {
   enterPrivateBus();
   Witness w;
   Process plant = start("plant", {"z_sine"});
-  Process controller = start("controller", {"z_sine", "--no-menu", "--set", kPatience});
+  Process controller = start("controller", {"z_sine", "--no-menu"});
   ASSERT_TRUE(w.until([&] { return w.states > 20; }));
   const Identity me = Identity::draw();
   const auto order = [&](Request request, std::int64_t to, std::int64_t sequence) {
@@ -281,8 +281,7 @@ TEST_F(Console, LcmLogplayerPlaysSamplesIntoALiveController) {
                              kShortProgram + "'" + out("a"));
   ASSERT_EQ(recorded.status, 0) << recorded.text;
   Witness w;
-  Process controller =
-      start("controller", {"z_sine", "--start", "--set", kPatience, "--set", kShortProgram});
+  Process controller = start("controller", {"z_sine", "--start", "--set", kShortProgram});
   Process player("/usr/bin/lcm-logplayer",
                  {"--regexp", "VES_SAMPLE", (folder_ / "a/run.lcmlog").string()});
   // The recorded legs do what this controller asks, a little earlier or later: it follows, and

@@ -122,8 +122,7 @@ TEST_F(Programs, LcmLoggerBesideARunReplaysToo) {
     Process plant = start("plant", {"z_sine"});
     while (sequence < 10 && bus.wait(5000)) {
     }
-    Process controller =
-        start("controller", {"--start", "z_sine", "--set", kPatience, "--set", kShortProgram});
+    Process controller = start("controller", {"--start", "z_sine", "--set", kShortProgram});
     EXPECT_EQ(controller.wait(), 0);
     plant.signal(SIGTERM);
     EXPECT_EQ(plant.wait(), 0);
@@ -153,11 +152,11 @@ TEST_F(Programs, SecondControllerRefusesToArmAndTheFirstGoesOn) {
     if (m && m->header.source == first_source) phase = static_cast<Phase>(m->phase);
   });
   Process plant = start("plant", {"puma_on_table_4_1"});
-  Process first = start("controller", {"--start", "puma_on_table_4_1", "--set", kPatience});
+  Process first = start("controller", {"--start", "puma_on_table_4_1"});
   while (engaged < 50 && bus.wait(10'000)) {
   }
   ASSERT_GE(engaged, 50);
-  Process second = start("controller", {"--start", "puma_on_table_4_1", "--set", kPatience});
+  Process second = start("controller", {"--start", "puma_on_table_4_1"});
   // It gives up after five seconds disarmed; listen meanwhile.
   while (second.running()) bus.wait(100);
   EXPECT_EQ(second.wait(), 1);

@@ -147,6 +147,7 @@ class Console {
           break;
         case Phase::kReturning: say("going home"); break;
         case Phase::kParked: say("parked, legs at home"); break;
+        case Phase::kStopping: say(fmt::format("stopping: {}", failing(s.latched))); break;
         case Phase::kStopped:
           say(fmt::format("STOPPED in tick {} by: {}. The legs hold; `reset` when it is gone.",
                           s.cause_tick, failing(s.latched)));
@@ -192,6 +193,11 @@ class Console {
       case Unrest::kChannel:
         return fmt::format("{} scatters by {:.1f} counts ({} allowed): something shakes it",
                            i < 6 ? kChannel[i] : "a channel", s.unrest_amount, limits.deviation);
+      case Unrest::kBias:
+        return fmt::format(
+            "{} would have a bias of {:.0f} counts ({:.0f} allowed): it carries a load "
+            "that is not in the model, or less than that",
+            i < 6 ? kChannel[i] : "a channel", s.unrest_amount, limits.bias);
       case Unrest::kNone: break;
     }
     return "no stream of new samples";

@@ -17,6 +17,9 @@ AdmittanceModel::AdmittanceModel(const ModalModel& model, double period)
   hold_.resize(6, k);
   eta_.setZero(k);
   eta_dot_.setZero(k);
+  eta_before_ = eta_;
+  eta_dot_before_ = eta_dot_;
+  period_ = period;
   coupled_ = !model.damping.isDiagonal(0.0);
   if (!coupled_) {
     for (Eigen::Index i = 0; i < k; ++i) {
@@ -49,6 +52,8 @@ void AdmittanceModel::reset(const Vec6& x) noexcept {
 
 void AdmittanceModel::step(const Wrench& F_Po_I) noexcept {
   Vector<kMaxModes> u;  // Phi^T W
+  eta_before_ = eta_;
+  eta_dot_before_ = eta_dot_;
   u.noalias() = Phi_.transpose() * F_Po_I.stacked();
   if (coupled_)
     stepCoupled(u);
@@ -64,6 +69,16 @@ void AdmittanceModel::step(const Wrench& F_Po_I) noexcept {
   motion_.x.noalias() += Phi_ * eta_;
   motion_.x_dot.noalias() = Phi_ * eta_dot_;
   motion_.x_ddot.noalias() = Phi_ * eta_ddot;
+}
+
+void AdmittanceModel::slow(double share) noexcept {
+  eta_ = eta_before_ + share * (eta_ - eta_before_);
+  eta_dot_ *= share;
+  motion_.x = offset_;
+  motion_.x.noalias() += Phi_ * eta_;
+  motion_.x_dot.noalias() = Phi_ * eta_dot_;
+  motion_.x_ddot.noalias() = Phi_ * (eta_dot_ - eta_dot_before_);
+  motion_.x_ddot /= period_;
 }
 
 void AdmittanceModel::stepModes(const Vector<kMaxModes>& u) noexcept {

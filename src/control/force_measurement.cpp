@@ -69,11 +69,16 @@ void Calibration::add(const Sample& sample, const Vec6& load) noexcept {
   if (statistics_.complete()) {
     Eigen::Index worst = 0;
     const double most = statistics_.deviation().maxCoeff(&worst);
-    if (most <= limits_.deviation) {
+    Eigen::Index largest = 0;
+    const double bias = statistics_.mean().cwiseAbs().maxCoeff(&largest);
+    if (most <= limits_.deviation && bias <= limits_.bias) {
       status_ = Status::kDone;
       return;
     }
-    restart(Unrest::kChannel, static_cast<int>(worst), most);
+    if (most <= limits_.deviation)
+      restart(Unrest::kBias, static_cast<int>(largest), bias);
+    else
+      restart(Unrest::kChannel, static_cast<int>(worst), most);
   }
   if (samples_ >= kPatience) status_ = Status::kRefused;
 }

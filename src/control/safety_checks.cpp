@@ -12,18 +12,43 @@ std::string_view name(Check check) noexcept {
     case Check::kFloorMat: return "floor mat";
     case Check::kFinite: return "finite numbers";
     case Check::kStale: return "sample age";
+    case Check::kOverrun: return "tick overrun";
+    case Check::kLegReading: return "leg reading";
     case Check::kForwardKinematics: return "forward kinematics";
     case Check::kPositionError: return "position error";
+    case Check::kPressure: return "pressure";
+    case Check::kSensorSaturated: return "sensor saturated";
+    case Check::kSensorFrozen: return "sensor frozen";
+    case Check::kOscillation: return "growing oscillation";
     case Check::kMotionLimits: return "motion limits";
     case Check::kActuatorLimits: return "actuator limits";
     case Check::kJointLimits: return "joint limits";
     case Check::kCollide: return "collide";
+    case Check::kConditioning: return "conditioning";
     case Check::kVelocity: return "velocity";
     case Check::kFlow: return "flow limits";
     case Check::kRival: return "second controller or machine";
     case Check::kCount: break;
   }
   return "none";
+}
+
+bool freezes(Check check) noexcept {
+  switch (check) {
+    case Check::kStale:
+    case Check::kOverrun:
+    case Check::kPressure:
+    case Check::kSensorSaturated:
+    case Check::kSensorFrozen:
+    case Check::kOscillation: return false;
+    default: return true;
+  }
+}
+
+bool Tripped::freeze() const noexcept {
+  for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(Check::kCount); ++i)
+    if (has(static_cast<Check>(i)) && freezes(static_cast<Check>(i))) return true;
+  return false;
 }
 
 Check Tripped::first() const noexcept {
@@ -37,10 +62,27 @@ bool velocityCheck(const SafetyLimits& limits, const Vec6& L, const Vec6& L_last
   return (L - L_last).cwiseAbs().maxCoeff<Eigen::PropagateNaN>() <= limits.leg_velocity * period;
 }
 
-bool positionErrorCheck(const SafetyLimits& limits, const Vec6& L_commanded,
-                        const Vec6& L_measured) noexcept {
-  return (L_commanded - L_measured).cwiseAbs().maxCoeff<Eigen::PropagateNaN>() <=
-         limits.position_error;
+bool positionErrorCheck(const SafetyLimits& limits, const Vec6& L_commanded, const Vec6& L_measured,
+                        const Vec6& speed) noexcept {
+  bool near = true;
+  for (int i = 0; i < kLegs; ++i) {
+    const double error = std::abs(L_commanded(i) - L_measured(i));
+    near = near && error <= limits.position_error &&
+           error <= limits.position_error_still + limits.position_error_lag * speed(i);
+  }
+  return near;
+}
+
+bool pressureCheck(const SafetyLimits& limits, const AdcCounts& adc) noexcept {
+  return adc[kWrenchChannels] >= limits.pressure_min && adc[kWrenchChannels] <= limits.pressure_max;
+}
+
+bool saturationCheck(const AdcCounts& adc) noexcept {
+  constexpr std::int32_t kLow = -32768, kHigh = 32767;  // [count]
+  bool inside = true;
+  for (std::size_t i = 0; i < kWrenchChannels; ++i)
+    inside = inside && adc[i] > kLow && adc[i] < kHigh;
+  return inside;
 }
 
 double segmentDistance(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) noexcept {
@@ -67,7 +109,18 @@ bool collideCheck(const SafetyLimits& limits, const Geometry& geometry,
     for (std::size_t j = i + 1; j < kLegs; ++j)
       clear = clear && segmentDistance(geometry.p_IBi_I[i], p_IPi_I[i], geometry.p_IBi_I[j],
                                        p_IPi_I[j]) >= limits.leg_clearance;
+  const double least = std::sin(limits.plate_angle);
+  const Vec3 normal_I = X_IP.R.col(2);
+  for (std::size_t i = 0; i < kLegs; ++i) {
+    const Vec3 along = (p_IPi_I[i] - geometry.p_IBi_I[i]).normalized();
+    clear = clear && along.z() >= least && along.dot(normal_I) >= least;
+  }
   return clear;
+}
+
+bool conditioningCheck(const SafetyLimits& limits, const Geometry& geometry,
+                       const Transform& X_IP) noexcept {
+  return conditionNumber(geometry, X_IP) <= limits.condition;
 }
 
 bool motionLimitsCheck(const SafetyLimits& limits, const Pose& x) noexcept {

@@ -15,6 +15,10 @@ PathPoint<6> atRest(const Vec6& x) {
   return point;
 }
 
+double brakeTime(const Vec6& v, const ControllerConfig::Braking& braking) {
+  return std::max(v.head<3>().norm() / braking.translation, v.tail<3>().norm() / braking.rotation);
+}
+
 }  // namespace
 
 std::string_view name(Phase phase) noexcept {
@@ -25,6 +29,7 @@ std::string_view name(Phase phase) noexcept {
     case Phase::kReturning: return "returning";
     case Phase::kParked: return "parked";
     case Phase::kStopped: return "stopped";
+    case Phase::kStopping: return "stopping";
   }
   return "unknown";
 }
@@ -49,22 +54,28 @@ const TickState& TestPlatform::tick(const TickInput& in) noexcept {
   }
   choosePhase();
 
-  // Admittance model or trajectory generation, then inverse kinematics.
-  const PathPoint<6> next = nextMotion(in.sample);
-  const BodyMotion P = bodyMotion(config_.geometry, Pose::from(next.x), next.x_dot, next.x_ddot);
-  const LegMotion legs = legMotion(config_.geometry, P);
-
-  state_.tripped = safetyChecks(in, next, P, legs);
-  if (state_.phase != Phase::kDisarmed && state_.tripped.any()) trip(state_.tripped);
+  // Admittance model or trajectory generation, inverse kinematics, safety checks.
+  Step step = check(in, nextMotion(in.sample));
+  state_.tripped = step.tripped;
+  if (state_.phase != Phase::kDisarmed && step.tripped.any()) {
+    const bool was_stopping = state_.phase == Phase::kStopping;
+    trip(step.tripped);
+    if (state_.phase == Phase::kStopping && !was_stopping) {
+      step = check(in, moveAt(++n_));
+      if (step.tripped.freeze()) trip(step.tripped);
+    }
+  }
 
   if (state_.phase != Phase::kStopped) {  // leg communication
-    state_.due = commandsNextState() ? state_.motion.x : next.x;
-    state_.motion = next;
-    state_.legs = legs;
+    state_.due = commandsNextState() ? state_.motion.x : step.next.x;
+    state_.motion = step.next;
+    state_.legs = step.legs;
     state_.command.engaged = state_.phase != Phase::kDisarmed;
     state_.command.segment = state_.segment;
-    if (legs.L.allFinite()) state_.command.counts = legCounts(config_.legs, legs.L);
+    if (step.legs.L.allFinite()) state_.command.counts = legCounts(config_.legs, step.legs.L);
   }
+  state_.command.park = state_.phase != Phase::kStopped && state_.phase != Phase::kStopping;
+  leg_speed_.step(state_.legs.L_dot, period_);
   state_.kind = state_.phase == Phase::kRunning ? segment_.kind : SegmentKind::kCount;
   state_.idle = idleTicks();
   return state_;
@@ -73,13 +84,22 @@ const TickState& TestPlatform::tick(const TickInput& in) noexcept {
 void TestPlatform::readSample(const TickInput& in) noexcept {
   const Sample& sample = in.sample;
   const bool fresh = sample.sequence > state_.sample_sequence;
+  const int age_before = state_.age;
   state_.age = fresh ? 0 : state_.age + 1;
   fresh_ticks_ = fresh && !in.rival ? fresh_ticks_ + 1 : 0;
+  const std::int64_t missed = state_.count < 0 ? 0 : in.tick - state_.tick - state_.idle - 1;
+  overruns_.take(in.tick, missed);
+  if (missed > 0) ++state_.late_ticks;
+  const auto waited = static_cast<double>(age_before + missed + 1) * period_;
   state_.tick = in.tick;
   ++state_.count;
   state_.sample_sequence = sample.sequence;
 
-  state_.L_measured = legLengths(config_.legs, sample.legs);
+  const Vec6 L = legLengths(config_.legs, sample.legs);
+  const bool follow = state_.command.engaged && state_.phase != Phase::kStopped;
+  if (!follow) readings_.reset();
+  if (fresh || !follow)
+    state_.L_measured = readings_.take(L, leg_speed_.speed(), waited, config_.safety.reading_jump);
   const ForwardSolution forward = forwardPose(config_.geometry, state_.L_measured, X_IP_measured_);
   legs_solved_ = forward.ok();
   if (legs_solved_) X_IP_measured_ = forward.X_IP;
@@ -94,6 +114,7 @@ void TestPlatform::measureWrench(const Sample& sample) noexcept {
   state_.total = forceMeasurement(config_.sensor, state_.bias, sample.adc, R_IP);
   state_.fixed = gravityCompensation(config_.payload, sample.q, R_IP, config_.gravity);
   state_.dynamic = state_.total - state_.fixed;
+  if (state_.age == 0) frozen_.take(sample.adc, staticCounts(sample));
 }
 
 Refusal TestPlatform::obey(const Order& order) noexcept {
@@ -122,8 +143,7 @@ Refusal TestPlatform::obey(const Order& order) noexcept {
     case Request::kRun:
       if (!ours) return Refusal::kNotArmed;
       if (phase != Phase::kArmed) return Refusal::kBusy;
-      begin(order.segment);
-      return Refusal::kNone;
+      return accept(order.segment);
     case Request::kHold:
       if (!ours) return Refusal::kNotArmed;
       if (phase != Phase::kArmed) hold();
@@ -145,9 +165,44 @@ Refusal TestPlatform::obey(const Order& order) noexcept {
       state_.cause_tick = -1;
       fresh_ticks_ = 0;
       wish_ = Request::kNone;
+      oscillation_.reset();
       return Refusal::kNone;
   }
   return Refusal::kNone;
+}
+
+/// Begins an order's segment, unless its path, gone through beforehand, fails a check.
+Refusal TestPlatform::accept(const Segment& segment) noexcept {
+  if (segment.kind == SegmentKind::kAdmittance && !feelsLittle()) return Refusal::kLoaded;
+  const TickState before = state_;
+  begin(segment);
+  if (segment.kind != SegmentKind::kMove && segment.kind != SegmentKind::kTrajectory)
+    return Refusal::kNone;
+  constexpr std::int64_t kLooks = 1000;  // [-] along the path
+  const std::int64_t stride = std::max<std::int64_t>(1, steps_ / kLooks);
+  for (std::int64_t n = 0; n <= steps_; n += stride) {
+    const PathPoint<6> at =
+        segment.kind == SegmentKind::kMove
+            ? moveAt(n)
+            : trajectoryGeneration(segment_.trajectory, segment_start_, n, steps_, period_);
+    const BodyMotion P = bodyMotion(config_.geometry, Pose::from(at.x), at.x_dot, at.x_ddot);
+    const LegMotion legs = legMotion(config_.geometry, P);
+    Tripped t = pathChecks(P.X, Pose::from(at.x), legs.L);
+    const Vec6 L_next = legs.L + period_ * legs.L_dot;
+    t.require(Check::kVelocity, velocityCheck(config_.safety, L_next, legs.L, period_));
+    t.require(Check::kFlow, flowLimitsCheck(config_.safety, L_next, legs.L, period_));
+    if (!t.any()) continue;
+    state_ = before;
+    state_.refused_by = t.first();
+    return Refusal::kOutside;
+  }
+  return Refusal::kNone;
+}
+
+/// Admittance control should begin with nothing but the base's own motion to come.
+bool TestPlatform::feelsLittle() const noexcept {
+  return state_.dynamic.f.norm() <= config_.safety.start_force &&
+         state_.dynamic.n.norm() <= config_.safety.start_moment;
 }
 
 void TestPlatform::choosePhase() noexcept {
@@ -175,6 +230,9 @@ void TestPlatform::choosePhase() noexcept {
       state_.phase = attended_ ? Phase::kArmed : Phase::kParked;
       if (attended_) state_.segment = -1;
       break;
+    case Phase::kStopping:
+      if (n_ >= steps_) freeze();
+      break;
     case Phase::kParked:
     case Phase::kStopped: break;
   }
@@ -199,10 +257,17 @@ bool TestPlatform::commandsNextState() const noexcept {
 
 void TestPlatform::beginProgram(int at) noexcept {
   state_.segment = at;
-  if (at < config_.program.size)
-    begin(config_.program.segments[static_cast<std::size_t>(at)]);
-  else
+  if (at >= config_.program.size) {
     beginReturn();
+    return;
+  }
+  const Segment& next = config_.program.segments[static_cast<std::size_t>(at)];
+  if (next.kind == SegmentKind::kAdmittance && !feelsLittle()) {
+    state_.refusal = Refusal::kLoaded;
+    beginReturn();
+    return;
+  }
+  begin(next);
 }
 
 void TestPlatform::begin(const Segment& segment) noexcept {
@@ -215,7 +280,10 @@ void TestPlatform::begin(const Segment& segment) noexcept {
   switch (segment.kind) {
     case SegmentKind::kCalibration: calibration_.begin(); break;
     case SegmentKind::kMove: beginMove(segment.target.stacked(), segment.duration); break;
-    case SegmentKind::kAdmittance: admittance_.reset(segment_start_); break;
+    case SegmentKind::kAdmittance:
+      admittance_.reset(segment_start_);
+      oscillation_.reset();
+      break;
     case SegmentKind::kTrajectory:
     case SegmentKind::kWatch:
     case SegmentKind::kCount: break;
@@ -228,11 +296,10 @@ void TestPlatform::beginReturn() noexcept {
   beginMove(Vec6::Zero(), 0.0);
 }
 
-/// Plans the braking at a gentle rate; where it ends.
-Vec6 TestPlatform::brake() noexcept {
+/// Plans the braking; where it ends.
+Vec6 TestPlatform::brake(const ControllerConfig::Braking& braking) noexcept {
   const Vec6& v = state_.motion.x_dot;
-  const double time = std::max(v.head<3>().norm() / config_.gentle_braking,
-                               v.tail<3>().norm() / config_.gentle_rotation_braking);
+  const double time = brakeTime(v, braking);
   brake_ = Quintic<6>();
   if (!(time > 0.0)) return state_.motion.x;
   const Vec6 rest = state_.motion.x + 0.5 * time * v;
@@ -244,7 +311,7 @@ Vec6 TestPlatform::brake() noexcept {
 
 /// To rest, then by a quintic to `target`; 0 s: as long as is gentle.
 void TestPlatform::beginMove(const Vec6& target, double duration) noexcept {
-  const Vec6 rest = brake();
+  const Vec6 rest = brake(config_.gentle_braking);
   if (duration <= 0.0) duration = gentleDuration(rest, target);
   move_ = Quintic<6>(atRest(rest), target, duration);
   n_ = 0;
@@ -257,7 +324,11 @@ void TestPlatform::hold() noexcept {
   state_.segment = -1;
   segment_ = {};
   segment_.kind = SegmentKind::kMove;
-  const Vec6 rest = brake();
+  planHold(config_.gentle_braking);
+}
+
+void TestPlatform::planHold(const ControllerConfig::Braking& braking) noexcept {
+  const Vec6 rest = brake(braking);
   move_ = Quintic<6>(atRest(rest), rest, period_);
   n_ = 0;
   steps_ = static_cast<std::int64_t>(std::ceil(brake_.duration() / period_));
@@ -279,7 +350,8 @@ PathPoint<6> TestPlatform::nextMotion(const Sample& sample) noexcept {
     case Phase::kDisarmed: return atRest(state_.measured.stacked());
     case Phase::kArmed:
       return atRest(state_.command.engaged ? state_.motion.x : state_.measured.stacked());
-    case Phase::kReturning: return moveAt(++n_);  // where it starts, the platform is already
+    case Phase::kReturning:
+    case Phase::kStopping: return moveAt(++n_);  // where it starts, the platform is already
     case Phase::kParked:
     case Phase::kStopped: return atRest(state_.motion.x);
     case Phase::kRunning: break;
@@ -293,7 +365,12 @@ PathPoint<6> TestPlatform::nextMotion(const Sample& sample) noexcept {
     case SegmentKind::kAdmittance:
       // A wrench that is no number must not enter the model's state; the finite check stops the
       // run.
-      if (state_.dynamic.stacked().allFinite()) admittance_.step(state_.dynamic);
+      if (state_.dynamic.stacked().allFinite()) {
+        admittance_.step(state_.dynamic);
+        envelope();
+        oscillation_.take(admittance_.energy(), sample.q, config_.stillness.joint, period_,
+                          config_.safety.growth_floor);
+      }
       return admittance_.motion();
     case SegmentKind::kWatch:
     case SegmentKind::kCount: break;
@@ -349,40 +426,100 @@ std::int64_t TestPlatform::idleTicks() const noexcept {
   return std::max<std::int64_t>(0, std::min(interval - into, steps_ - since) - 1);
 }
 
-Tripped TestPlatform::safetyChecks(const TickInput& in, const PathPoint<6>& next,
-                                   const BodyMotion& P, const LegMotion& legs) const noexcept {
+/// Slows the motion as a whole, never one leg, so that it can always come to rest, braking gently
+/// along its path, where every path check still passes.
+void TestPlatform::envelope() noexcept {
+  const PathPoint<6> proposed = admittance_.motion();
+  const Vec6& x = state_.motion.x;
+  const Vec6 step = proposed.x - x;
+  const auto fits = [&](double share) {
+    const Vec6 v = share * step / period_;
+    const double brake_time = brakeTime(v, config_.gentle_braking);
+    const Pose next = Pose::from(x + share * step);
+    const Pose rest = Pose::from(x + share * step + 0.5 * brake_time * v);
+    const Transform X_rest = config_.geometry.fromHome(rest);
+    const Vec6 L = legLengths(config_.geometry, config_.geometry.fromHome(next));
+    return !pathChecks(X_rest, rest, legLengths(config_.geometry, X_rest)).any() &&
+           velocityCheck(config_.safety, L, state_.legs.L, period_) &&
+           flowLimitsCheck(config_.safety, L, state_.legs.L, period_);
+  };
+  state_.slowed = 1.0;
+  if (fits(1.0)) return;
+  constexpr int kHalvings = 10;
+  double low = 0.0, high = 1.0;
+  for (int i = 0; i < kHalvings; ++i) {
+    const double middle = 0.5 * (low + high);
+    (fits(middle) ? low : high) = middle;
+  }
+  state_.slowed = low;
+  admittance_.slow(low);
+}
+
+/// The checks that depend on the pose alone.
+Tripped TestPlatform::pathChecks(const Transform& X_IP, const Pose& x,
+                                 const Vec6& L) const noexcept {
+  const SafetyLimits& limits = config_.safety;
+  Tripped t;
+  t.require(Check::kMotionLimits, motionLimitsCheck(limits, x));
+  t.require(Check::kActuatorLimits, actuatorLimitsCheck(limits, L));
+  t.require(Check::kJointLimits, joint_axes_.check(limits, config_.geometry, X_IP));
+  t.require(Check::kCollide, collideCheck(limits, config_.geometry, X_IP));
+  t.require(Check::kConditioning, conditioningCheck(limits, config_.geometry, X_IP));
+  return t;
+}
+
+/// Inverse kinematics and all safety checks of what would be commanded.
+TestPlatform::Step TestPlatform::check(const TickInput& in,
+                                       const PathPoint<6>& next) const noexcept {
+  const BodyMotion P = bodyMotion(config_.geometry, Pose::from(next.x), next.x_dot, next.x_ddot);
+  const LegMotion legs = legMotion(config_.geometry, P);
   const SafetyLimits& limits = config_.safety;
   // Before the legs follow, the last command is where they are.
   const bool following = state_.command.engaged;
   const Vec6& L_last = following ? state_.legs.L : legs.L;
   const Vec6& L_in_force = following ? state_.legs.L : state_.L_measured;
 
-  Tripped t;
+  Tripped t = pathChecks(P.X, Pose::from(next.x), legs.L);
   t.require(Check::kPanicButton, in.sample.switches & kPanicButtonClosed);
   t.require(Check::kFloorMat, in.sample.switches & kFloorMatClosed);
   t.require(Check::kFinite, next.x.allFinite() && next.x_dot.allFinite() &&
                                 next.x_ddot.allFinite() && legs.L.allFinite() &&
                                 in.sample.q.allFinite() && state_.dynamic.stacked().allFinite());
   t.require(Check::kStale, in.sample.sequence >= 0 && state_.age <= limits.stale_ticks);
+  t.require(Check::kOverrun, overruns_.good(limits, std::llround(1.0 / period_)));
+  t.require(Check::kLegReading, readings_.good());
   t.require(Check::kForwardKinematics, legs_solved_);
-  t.require(Check::kPositionError, positionErrorCheck(limits, L_in_force, state_.L_measured));
-  t.require(Check::kMotionLimits, motionLimitsCheck(limits, Pose::from(next.x)));
-  t.require(Check::kActuatorLimits, actuatorLimitsCheck(limits, legs.L));
-  t.require(Check::kJointLimits, joint_axes_.check(limits, config_.geometry, P.X));
-  t.require(Check::kCollide, collideCheck(limits, config_.geometry, P.X));
+  t.require(Check::kPositionError,
+            positionErrorCheck(limits, L_in_force, state_.L_measured, leg_speed_.speed()));
+  t.require(Check::kPressure, pressureCheck(limits, in.sample.adc));
+  t.require(Check::kSensorSaturated, saturationCheck(in.sample.adc));
+  t.require(Check::kSensorFrozen, frozen_.good(limits));
+  t.require(Check::kOscillation, oscillation_.good(limits));
   t.require(Check::kVelocity, velocityCheck(limits, legs.L, L_last, period_));
   t.require(Check::kFlow, flowLimitsCheck(limits, legs.L, L_last, period_));
   t.require(Check::kRival, !in.rival);
-  return t;
+  return {next, legs, t};
 }
 
-/// Latches, and holds the last checked lengths from now on.
+/// Latches; then brakes, or holds the last checked lengths from now on.
 void TestPlatform::trip(Tripped tripped) noexcept {
   state_.latched = state_.latched | tripped;
   if (state_.phase == Phase::kStopped) return;
+  if (state_.phase != Phase::kStopping) {
+    state_.cause = tripped.first();
+    state_.cause_tick = state_.tick;
+  }
+  if (tripped.freeze()) {
+    freeze();
+  } else if (state_.phase != Phase::kStopping) {
+    planHold(config_.stop_braking);
+    state_.phase = Phase::kStopping;
+    if (steps_ == 0) freeze();
+  }
+}
+
+void TestPlatform::freeze() noexcept {
   state_.phase = Phase::kStopped;
-  state_.cause = tripped.first();
-  state_.cause_tick = state_.tick;
   state_.motion = atRest(state_.motion.x);
   state_.legs.L_dot.setZero();
   state_.legs.L_ddot.setZero();

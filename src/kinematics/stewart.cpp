@@ -111,6 +111,18 @@ ForwardSolution forwardPose(const Geometry& geometry, const Vec6& L,
   }
 }
 
+double conditionNumber(const Geometry& geometry, const Transform& X_IP) noexcept {
+  Mat6 J;
+  for (int i = 0; i < kLegs; ++i) {
+    const Leg l = leg(geometry, X_IP, i);
+    const Vec3 along = l.d.normalized();
+    J.row(i) << along.transpose(), l.r.cross(along).transpose();
+  }
+  const Eigen::PartialPivLU<Mat6> lu(J);
+  if (!regular(lu)) return HUGE_VAL;
+  return J.norm() * lu.inverse().norm() / 6.0;
+}
+
 bool forwardMotion(const Geometry& geometry, const Transform& X_IP, const LegMotion& legs,
                    BodyMotion& P) noexcept {
   P.X = X_IP;

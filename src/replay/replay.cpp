@@ -26,7 +26,9 @@ void forEachField(const state_t& m, F f) {
   f("order_source", -1, m.order_source);
   f("order_sequence", -1, m.order_sequence);
   f("refusal", -1, m.refusal);
+  f("refused_by", -1, m.refused_by);
   f("rival", -1, m.rival);
+  f("ran_long", -1, m.ran_long);
   f("phase", -1, m.phase);
   f("segment", -1, m.segment);
   f("kind", -1, m.kind);
@@ -55,7 +57,10 @@ void forEachField(const state_t& m, F f) {
   f("latched", -1, m.latched);
   f("cause", -1, m.cause);
   f("cause_tick", -1, m.cause_tick);
+  f("slowed", -1, m.slowed);
+  f("late_ticks", -1, m.late_ticks);
   f("engaged", -1, m.engaged);
+  f("park", -1, m.park);
   list("counts", m.counts);
 }
 
@@ -63,6 +68,7 @@ template <typename F>
 void forEachField(const leg_command_t& m, F f) {
   f("engaged", -1, m.engaged);
   f("segment", -1, m.segment);
+  f("park", -1, m.park);
   int i = 0;
   for (const std::int32_t value : m.counts) f("counts", i++, value);
 }
@@ -178,6 +184,7 @@ class Replayer {
     in.tick = recorded.header.sequence;
     in.order = orderOf(recorded);
     in.rival = recorded.rival != 0;
+    in.ran_long = recorded.ran_long != 0;
     if (recorded.sample_sequence >= 0) {
       const Sample* sample = samples_.find(recorded.sample_sequence);
       if (!sample)

@@ -93,9 +93,11 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
     bus.wait(100);
   }
   Ticker ticker(experiment.controller.period);
+  std::int64_t woke = monotonicNow();
   for (;; ++in.tick) {
+    in.ran_long = monotonicNow() - woke > experiment.controller.period;
     in.tick += ticker.wait();
-    const std::int64_t woke = monotonicNow();
+    woke = monotonicNow();
     bus.drain();
     in.sample = link.sample();
     const std::int64_t sample_time = link.sampleTime();

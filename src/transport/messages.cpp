@@ -65,6 +65,7 @@ leg_command_t toMessage(const LegCommand& command, const header_t& header) noexc
   m.header = header;
   m.engaged = command.engaged ? 1 : 0;
   m.segment = command.segment;
+  m.park = command.park ? 1 : 0;
   std::copy(command.counts.begin(), command.counts.end(), m.counts);
   return m;
 }
@@ -78,7 +79,9 @@ state_t toMessage(const TickState& state, const TickInput& in, const header_t& h
   m.order_source = state.order.source;
   m.order_sequence = state.order.sequence;
   m.refusal = static_cast<std::int32_t>(state.refusal);
+  m.refused_by = static_cast<std::int32_t>(state.refused_by);
   m.rival = in.rival ? 1 : 0;
+  m.ran_long = in.ran_long ? 1 : 0;
   m.phase = static_cast<std::int32_t>(state.phase);
   m.segment = state.segment;
   m.kind = static_cast<std::int32_t>(state.kind);
@@ -107,7 +110,10 @@ state_t toMessage(const TickState& state, const TickInput& in, const header_t& h
   m.latched = static_cast<std::int32_t>(state.latched.bits());
   m.cause = static_cast<std::int32_t>(state.cause);
   m.cause_tick = state.cause_tick;
+  m.slowed = state.slowed;
+  m.late_ticks = state.late_ticks;
   m.engaged = state.command.engaged ? 1 : 0;
+  m.park = state.command.park ? 1 : 0;
   std::copy(state.command.counts.begin(), state.command.counts.end(), m.counts);
   return m;
 }
@@ -210,7 +216,9 @@ std::optional<LegCommand> fromMessage(const leg_command_t& m) noexcept {
   LegCommand c;
   c.engaged = m.engaged != 0;
   c.segment = m.segment;
-  bool good = inRange(m.segment, -1, kMaxSegments) && inRange<int>(m.engaged, 0, 1);
+  c.park = m.park != 0;
+  bool good = inRange(m.segment, -1, kMaxSegments) && inRange<int>(m.engaged, 0, 1) &&
+              inRange<int>(m.park, 0, 1);
   for (std::size_t i = 0; i < c.counts.size(); ++i) {
     c.counts[i] = m.counts[i];
     good = good && inRange(m.counts[i], 0, plant::Temposonics::kMaxCount);

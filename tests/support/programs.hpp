@@ -61,7 +61,9 @@ class Programs : public testing::Test {
     return nlohmann::json::parse(in);
   }
   /// A program that runs beside the test.
-  static Process start(const std::string& name, const std::vector<std::string>& arguments) {
+  static Process start(const std::string& name, std::vector<std::string> arguments) {
+    if (name == "controller")
+      arguments.insert(arguments.end(), patience().begin(), patience().end());
     return {std::string(VES_TEST_APP_DIR) + "/ves-" + name, arguments};
   }
   /// Commands of a log, in order.
@@ -79,11 +81,21 @@ class Programs : public testing::Test {
   }
   // On a loaded machine processes sleep through samples, and sockets overflow. Neither is what
   // these tests are about: the controller waits longer, and a log with holes is recorded once more.
-  static constexpr const char* kPatience = "safety.stale_ticks=1000";
+  static const std::vector<std::string>& patience() {
+    static const std::vector<std::string> sets = {
+        "--set", "safety.stale_ticks=1000",         "--set", "safety.stall_ticks=1000",
+        "--set", "safety.overruns_per_second=1000", "--set", "safety.position_error_still_m=0.1",
+        "--set", "safety.reading_jump_m=1"};
+    return sets;
+  }
   static constexpr const char* kShortProgram =
       "program=[{calibration: {}},{trajectory: {duration_s: 1, z: {sine: {amplitude_m: 0.02, "
       "frequency_hz: 1}}}}]";
-  static std::string patient() { return std::string("--set ") + kPatience; }
+  static std::string patient() {
+    std::string line;
+    for (const std::string& word : patience()) line += word + " ";
+    return line;
+  }
 
   static void untilNothingIsLost(const std::function<std::string()>& record) {
     for (int i = 0; i < 4; ++i) {

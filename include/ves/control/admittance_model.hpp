@@ -34,6 +34,15 @@ class AdmittanceModel {
   /// (C.6): the state one period after W began to act.
   void step(const Wrench& F_Po_I) noexcept;
 
+  /// Takes back all but `share` of the last step, and of the rate it led to: all modes alike, so
+  /// the path stays and only the motion along it is slowed.
+  void slow(double share) noexcept;
+
+  /// [J] kinetic and elastic: the modes are mass-normalised.
+  double energy() const noexcept {
+    return 0.5 * (eta_dot_.squaredNorm() + k_.dot(eta_.cwiseAbs2()));
+  }
+
   /// (C.7): position, velocity, acceleration at the last step's end.
   const PathPoint<6>& motion() const noexcept { return motion_; }
 
@@ -55,11 +64,13 @@ class AdmittanceModel {
   Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::RowMajor, kMaxModes, 6> Phi_pinv_;
   Vector<kMaxModes> k_;  // [1/s^2]
   Vector<kMaxModes> c_;  // [1/s] diagonal of the damping
+  double period_ = 0.0;  // [s]
   bool coupled_ = false;
   Eigen::Array<double, 6, Eigen::Dynamic, 0, 6, kMaxModes> hold_;  // a mode's Phi (4), Gamma (2)
   Square Phi_coupled_, Gamma_coupled_;                             // when coupled
   Square damping_;                                                 // when coupled
   Vector<kMaxModes> eta_, eta_dot_;
+  Vector<kMaxModes> eta_before_, eta_dot_before_;  // the last step
   Vec6 offset_ = Vec6::Zero();
   PathPoint<6> motion_;
 };

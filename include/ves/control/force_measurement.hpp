@@ -26,6 +26,7 @@ struct StillnessLimits {
   int leg_counts = 0;      // [count] of a leg's reading
   double joint = 0.0;      // [rad | m] of the robot
   double deviation = 0.0;  // [count] standard deviation of a wrench channel
+  double bias = 0.0;       // [count] largest that can be a stray voltage; more is an unknown load
 };
 
 /// Mean, standard deviation and standard error of the six wrench channels over kCalibrationSamples.
@@ -55,7 +56,7 @@ class ChannelStatistics {
 };
 
 /// What kept a calibration from being taken.
-enum class Unrest : std::int32_t { kNone, kLeg, kJoint, kChannel };
+enum class Unrest : std::int32_t { kNone, kLeg, kJoint, kChannel, kBias };
 
 /// The calibration routine (report, 2.3): the bias of each channel over 100 samples at rest. Starts
 /// again whenever something moves, and gives up after kPatience samples.

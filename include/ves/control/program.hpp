@@ -63,6 +63,8 @@ enum class Refusal : std::int32_t {
   kArmed,         // the legs are ours already
   kNotStopped,    // nothing to leave
   kCauseRemains,  // a check still fails
+  kOutside,       // its path would fail a safety check
+  kLoaded,        // the sensor feels more than admittance control should begin with
   kCount
 };
 

@@ -18,12 +18,19 @@ enum class Check : std::uint32_t {
   kFloorMat,
   kFinite,             // a number that is not one, anywhere in the tick
   kStale,              // no new sample for too long
+  kOverrun,            // ticks missed: one long stall, or too many in a second
+  kLegReading,         // a leg's reading jumped as no leg can
   kForwardKinematics,  // the measured legs belong to no pose
   kPositionError,
+  kPressure,         // hydraulic pressure out of range
+  kSensorSaturated,  // a wrench channel at the end of the converter
+  kSensorFrozen,     // readings that stand while the weight they carry turns
+  kOscillation,      // the emulated base gains energy that nothing gives it
   kMotionLimits,
   kActuatorLimits,
   kJointLimits,
-  kCollide,
+  kCollide,       // legs against each other, or against a plate
+  kConditioning,  // near a singular pose
   kVelocity,
   kFlow,
   kRival,  // another controller or machine is on the bus
@@ -31,6 +38,10 @@ enum class Check : std::uint32_t {
 };
 
 std::string_view name(Check check) noexcept;
+
+/// What a trip does. A freeze holds the last checked lengths at once. A controlled stop brakes
+/// along the motion first: for causes that say nothing against the next centimetres of the path.
+bool freezes(Check check) noexcept;
 
 /// A set of tripped checks.
 class Tripped {
@@ -45,6 +56,8 @@ class Tripped {
   bool has(Check check) const noexcept { return (bits_ & bit(check)) != 0; }
   bool any() const noexcept { return bits_ != 0; }
   std::uint32_t bits() const noexcept { return bits_; }
+  /// One of them freezes.
+  bool freeze() const noexcept;
   /// The tripped check of highest priority; kCount when none.
   Check first() const noexcept;
 
@@ -58,28 +71,50 @@ class Tripped {
 };
 
 struct SafetyLimits {
-  double leg_velocity = 0.0;    // [m/s] commanded
-  double position_error = 0.0;  // [m] commanded minus measured length
-  double translation = 0.0;     // [m] of each coordinate from home
-  double rotation = 0.0;        // [rad] of each coordinate from home
-  double leg_min = 0.0;         // [m]
-  double leg_max = 0.0;         // [m]
-  double joint_cone = 0.0;      // [rad] half angle about a joint's own axis
-  double leg_clearance = 0.0;   // [m] least distance between the axes of two legs
-  double bore_area = 0.0;       // [m^2] fed when a leg extends
-  double rod_side_area = 0.0;   // [m^2] fed when it retracts
-  double flow = 0.0;            // [m^3/s] of one leg
-  int stale_ticks = 0;          // [-] ticks without a new sample
+  double leg_velocity = 0.0;          // [m/s] commanded
+  double position_error = 0.0;        // [m] commanded minus measured length, at most
+  double position_error_still = 0.0;  // [m] the same, of a leg at rest
+  double position_error_lag = 0.0;    // [s] and so much more per speed of the leg
+  double reading_jump = 0.0;          // [m] of a leg at rest, from one sample to the next
+  double translation = 0.0;           // [m] of each coordinate from home
+  double rotation = 0.0;              // [rad] of each coordinate from home
+  double leg_min = 0.0;               // [m]
+  double leg_max = 0.0;               // [m]
+  double joint_cone = 0.0;            // [rad] half angle about a joint's own axis
+  double leg_clearance = 0.0;         // [m] least distance between the axes of two legs
+  double plate_angle = 0.0;           // [rad] least angle between a leg and a plate
+  double condition = 0.0;             // [-] largest condition number of the Jacobian
+  double bore_area = 0.0;             // [m^2] fed when a leg extends
+  double rod_side_area = 0.0;         // [m^2] fed when it retracts
+  double flow = 0.0;                  // [m^3/s] of one leg
+  int stale_ticks = 0;                // [-] ticks without a new sample
+  int stall_ticks = 0;                // [-] ticks missed in a row
+  int overruns = 0;                   // [-] late ticks in one second
+  int pressure_min = 0;               // [count]
+  int pressure_max = 0;               // [count]
+  int frozen_samples = 0;             // [-] with six identical readings
+  double frozen_counts = 0.0;         // [count] by which the weight should have changed one of them
+  int growing_windows = 0;            // [-] in a row, each with more energy than the last
+  double growth_floor = 0.0;          // [J] below which nothing is said
+  double start_force = 0.0;           // [N] felt when admittance control begins
+  double start_moment = 0.0;          // [N m]
 };
 
 /// Successive commanded lengths differ by no more than leg_velocity allows in one period.
 bool velocityCheck(const SafetyLimits&, const Vec6& L, const Vec6& L_last, double period) noexcept;
 
-/// The commanded length is near the measured one.
-bool positionErrorCheck(const SafetyLimits&, const Vec6& L_commanded,
-                        const Vec6& L_measured) noexcept;
+/// The measured length is near the commanded one; the servo lags, so the more speed [m/s] a leg has
+/// had lately, the farther behind it may be.
+bool positionErrorCheck(const SafetyLimits&, const Vec6& L_commanded, const Vec6& L_measured,
+                        const Vec6& speed) noexcept;
 
-/// No two legs come closer than leg_clearance.
+/// The pressure's reading is between its limits.
+bool pressureCheck(const SafetyLimits&, const AdcCounts& adc) noexcept;
+
+/// No wrench channel reads an end of the 16-bit converter.
+bool saturationCheck(const AdcCounts& adc) noexcept;
+
+/// No two legs come closer than leg_clearance, and no leg lies down on a plate.
 bool collideCheck(const SafetyLimits&, const Geometry&, const Transform& X_IP) noexcept;
 
 /// Every coordinate is inside the workspace.
@@ -91,6 +126,9 @@ bool actuatorLimitsCheck(const SafetyLimits&, const Vec6& L) noexcept;
 /// The flow that each leg's change of length takes is available.
 bool flowLimitsCheck(const SafetyLimits&, const Vec6& L, const Vec6& L_last,
                      double period) noexcept;
+
+/// The condition number of the Jacobian is small: far from singular poses.
+bool conditioningCheck(const SafetyLimits&, const Geometry&, const Transform& X_IP) noexcept;
 
 /// Axes of the ball joints: along the legs at home.
 class JointAxes {

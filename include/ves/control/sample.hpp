@@ -35,6 +35,7 @@ struct LegCommand {
   bool engaged = false;       // false: the legs stay where they are and ignore the counts
   LegCounts counts{};         // [count] (C.13)
   std::int32_t segment = -1;  // [-] where the program is; other equipment takes its cue from it
+  bool park = false;          // should no command follow, the legs may go home slowly
 };
 
 }  // namespace ves

@@ -4,17 +4,19 @@
 //
 //              start, arm          program, order
 //   disarmed -------------> armed ---------------> running --------.
-//       ^                   |   ^ <------ over ------'  |          | any check trips
-//       | reset             |   `------- held ----------|          |
-//       |              stop |                           | stop     v
-//       |                   `-------> returning <-------'       stopped
-//       |                                 |                        |
-//       |                                 `--> parked              |
-//       `----------------------------------------------------------'
+//       ^                   |   ^ <------ over ------'  |          |
+//       | reset             |   `------- held ----------|          | a check fails
+//       |              stop |                           | stop     |
+//       |                   `-------> returning <-------'          |-- freezes -----------.
+//       |                                 |                        |                      v
+//       |                                 `--> parked              `--> stopping ----> stopped
+//       `---------------------------------------------------------------------------------'
 //
 // Armed is holding still, ready for an order. A program started without anybody in attendance ends
-// by returning to home and parking. A trip holds the last checked lengths until a reset, which is
-// refused while its cause remains; what follows begins at the measured pose again.
+// by returning to home and parking. A check that freezes holds the last checked lengths at once;
+// the others brake along the motion first (stopping), and freeze should a freezing check fail
+// meanwhile. A stop lasts until a reset, which is refused while its cause remains; what follows
+// begins at the measured pose again.
 //
 // The invariant: every command that leaves is either the checked new lengths or the last checked
 // ones.
@@ -27,8 +29,8 @@
 #include "ves/control/force_measurement.hpp"
 #include "ves/control/gravity_compensation.hpp"
 #include "ves/control/leg_communication.hpp"
+#include "ves/control/monitors.hpp"
 #include "ves/control/program.hpp"
-#include "ves/control/safety_checks.hpp"
 
 namespace ves {
 
@@ -38,7 +40,8 @@ enum class Phase : std::int32_t {
   kRunning,    // a segment: of the program, or an order's
   kReturning,  // gently home
   kParked,     // at home, done
-  kStopped     // a check tripped; holding the last checked lengths
+  kStopped,    // a check tripped; holding the last checked lengths
+  kStopping    // a controlled stop: braking along the motion
 };
 
 std::string_view name(Phase phase) noexcept;
@@ -54,20 +57,25 @@ struct ControllerConfig {
   LegCodec legs;
   SafetyLimits safety;
   Program program;
-  double gentle_speed = 0.05;            // [m/s] peak, of moves and the return
-  double gentle_rotation = 0.10;         // [rad/s] peak
-  double gentle_braking = 1.5;           // [m/s^2] mean, when one begins in motion
-  double gentle_rotation_braking = 2.5;  // [rad/s^2] mean
-  int arming_samples = 10;               // [-] consecutive ticks with a new sample before arming
-  StillnessLimits stillness;             // of a calibration
-  double tare_ramp = 1.0;                // [s] over which a tare takes effect
+  double gentle_speed = 0.05;     // [m/s] peak, of moves and the return
+  double gentle_rotation = 0.10;  // [rad/s] peak
+  struct Braking {
+    double translation = 0.0;  // [m/s^2] mean
+    double rotation = 0.0;     // [rad/s^2] mean
+  };
+  Braking gentle_braking = {1.5, 2.5};  // of moves that begin in motion, and before the envelope
+  Braking stop_braking = {5.0, 8.5};    // of a controlled stop
+  int arming_samples = 10;              // [-] consecutive ticks with a new sample before arming
+  StillnessLimits stillness;            // of a calibration
+  double tare_ramp = 1.0;               // [s] over which a tare takes effect
 };
 
 struct TickInput {
   std::int64_t tick = 0;  // [-] counts controller periods, missed ones included
   Sample sample;          // the newest
   Order order;
-  bool rival = false;  // another controller or machine was heard since the last tick
+  bool rival = false;     // another controller or machine was heard since the last tick
+  bool ran_long = false;  // ticks were missed because the last one took too long; else it woke late
 };
 
 /// Everything one tick knew and decided.
@@ -79,6 +87,7 @@ struct TickState {
   std::int32_t segment = -1;               // [-] of the program, -1 outside it
   SegmentKind kind = SegmentKind::kCount;  // of what runs; kCount: nothing
   OrderId order;                           // the last one given
+  Check refused_by = Check::kCount;        // of a path that was refused
   Refusal refusal = Refusal::kNone;        // of it
   std::int64_t idle = 0;                   // [-] ticks to come of which nothing is expected
   std::int32_t age = 0;                    // [-] ticks since the sample was new
@@ -95,10 +104,12 @@ struct TickState {
   double unrest_amount = 0.0;                                    // [count | rad | m]
   Vec6 deviation = Vec6::Zero();                                 // [count] of a channel's samples
   Vec6 standard_error = Vec6::Zero();                            // [count] of the bias
-  Tripped tripped;                                               // in this tick
-  Tripped latched;                                               // since the start
-  Check cause = Check::kCount;                                   // the first to latch
-  std::int64_t cause_tick = -1;                                  // [-]
+  double slowed = 1.0;           // [-] share of the admittance model's step that was taken
+  std::int64_t late_ticks = 0;   // [-] so far
+  Tripped tripped;               // in this tick
+  Tripped latched;               // since the start
+  Check cause = Check::kCount;   // the first to latch
+  std::int64_t cause_tick = -1;  // [-]
   LegCommand command;
 };
 
@@ -118,13 +129,17 @@ class TestPlatform {
   void readSample(const TickInput& in) noexcept;
   void measureWrench(const Sample& sample) noexcept;
   Refusal obey(const Order& order) noexcept;
+  Refusal accept(const Segment& segment) noexcept;
+  bool feelsLittle() const noexcept;
   void choosePhase() noexcept;
   void beginProgram(int at) noexcept;
   void begin(const Segment& segment) noexcept;
   void beginReturn() noexcept;
   void beginMove(const Vec6& target, double duration) noexcept;
-  Vec6 brake() noexcept;
+  Vec6 brake(const ControllerConfig::Braking& braking) noexcept;
   void hold() noexcept;
+  void planHold(const ControllerConfig::Braking& braking) noexcept;
+  void freeze() noexcept;
   bool segmentIsOver() const noexcept;
   bool commandsNextState() const noexcept;
   void calibrate(const Sample& sample) noexcept;
@@ -132,8 +147,16 @@ class TestPlatform {
   Vec6 staticCounts(const Sample& sample) const noexcept;
   std::int64_t idleTicks() const noexcept;
   PathPoint<6> nextMotion(const Sample& sample) noexcept;
-  Tripped safetyChecks(const TickInput& in, const PathPoint<6>& next, const BodyMotion& P,
-                       const LegMotion& legs) const noexcept;
+  void envelope() noexcept;
+  Tripped pathChecks(const Transform& X_IP, const Pose& x, const Vec6& L) const noexcept;
+
+  /// A command in the making.
+  struct Step {
+    PathPoint<6> next;
+    LegMotion legs;
+    Tripped tripped;
+  };
+  Step check(const TickInput& in, const PathPoint<6>& next) const noexcept;
   void trip(Tripped tripped) noexcept;
   PathPoint<6> moveAt(std::int64_t n) const noexcept;
   double gentleDuration(const Vec6& from, const Vec6& to) const noexcept;
@@ -144,6 +167,11 @@ class TestPlatform {
   AdmittanceModel admittance_;
   Mat6 S_proc_;  // [count per N | N m]
   Calibration calibration_;
+  LegSpeed leg_speed_;
+  LegReadings readings_;
+  FrozenSensor frozen_;
+  Overruns overruns_;
+  Oscillation oscillation_;
   ChannelStatistics tare_;  // what the sensor feels beyond what it should
   enum class Tare { kNone, kAveraging, kRamping } taring_ = Tare::kNone;
   Quintic<6> bias_path_;     // [count] of a tare

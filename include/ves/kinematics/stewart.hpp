@@ -73,6 +73,10 @@ inline constexpr int kForwardIterations = 20;
 ForwardSolution forwardPose(const Geometry& geometry, const Vec6& L,
                             const Transform& guess) noexcept;
 
+/// |J| |J^-1| / 6 in the Frobenius norm, of the Jacobian from twists to leg rates with lengths
+/// counted in metres: 1 at best, infinite where the legs cannot hold the platform.
+double conditionNumber(const Geometry& geometry, const Transform& X_IP) noexcept;
+
 /// Rate (2.24) and acceleration (2.32) of P at the pose X_IP. Where (2.30) to (2.32) print only the
 /// diagonal of the second derivative, the whole of it is used. False when the Jacobian is singular;
 /// then only P.X is set.

@@ -58,8 +58,8 @@ struct Column {
 };
 std::vector<Column> columns(const Experiment& experiment);
 
-/// True when the name begins with one of `select`, which is then marked as used; or select is empty.
-/// Time is always taken.
+/// True when the name begins with one of `select`, which is then marked as used; or select is
+/// empty. Time is always taken.
 bool selected(const std::string& name, const std::vector<std::string>& select,
               std::vector<bool>& used);
 

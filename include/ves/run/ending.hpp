@@ -21,7 +21,8 @@ class Ending {
     ++result_.ticks;
     last_tick_ = state.tick;
     result_.phase = state.phase;
-    result_.uncalibrated = state.calibration == Calibration::Status::kRefused;
+    result_.cut_short =
+        state.calibration == Calibration::Status::kRefused || state.refusal == Refusal::kLoaded;
     const bool stop = request == Request::kStop;
     if (request == Request::kHold) attended_ = true;
     switch (state.phase) {

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Safety checks that need a memory: each looks at one thing from tick to tick, and says whether it
+// is still right.
+#pragma once
+
+#include "ves/control/safety_checks.hpp"
+
+namespace ves {
+
+/// The speed [m/s] that each leg has had lately: rises at once, falls away over kMemory.
+class LegSpeed {
+ public:
+  static constexpr double kMemory = 0.3;  // [s]
+  void step(const Vec6& L_dot, double period) noexcept {
+    speed_ = L_dot.cwiseAbs().cwiseMax(speed_ * (1.0 - period / kMemory));
+  }
+  const Vec6& speed() const noexcept { return speed_; }
+
+ private:
+  Vec6 speed_ = Vec6::Zero();
+};
+
+/// Readings of the legs: one that no leg can have reached since the last is not believed; the one
+/// before stands. Twice in a row is a fault.
+class LegReadings {
+ public:
+  static constexpr int kPatience = 1;  // [-] readings in a row that may be wrong
+
+  /// `speed` is what the legs were told lately, `time` [s] has passed since the last reading.
+  /// Returns the lengths to believe.
+  const Vec6& take(const Vec6& L, const Vec6& speed, double time, double jump) noexcept;
+  /// Believes whatever comes next: the legs were not ours.
+  void reset() noexcept { known_ = false; }
+
+  bool good() const noexcept { return wrong_ <= kPatience; }
+
+ private:
+  bool known_ = false;
+  int wrong_ = 0;  // [-] in a row
+  Vec6 L_ = Vec6::Zero();
+};
+
+/// Six readings that stay bit for bit the same while the weight they carry should have changed one.
+class FrozenSensor {
+ public:
+  /// `expected` [count] is what the static load alone reads.
+  void take(const AdcCounts& adc, const Vec6& expected) noexcept;
+  bool good(const SafetyLimits& limits) const noexcept {
+    return same_ < limits.frozen_samples || !(change_ > limits.frozen_counts);
+  }
+
+ private:
+  AdcCounts last_{};
+  Vec6 expected_ = Vec6::Zero();
+  int same_ = 0;         // [-] samples
+  double change_ = 0.0;  // [count] of the expected since then
+};
+
+/// Ticks that came late: woke late, or the one before ran long. Never made up for.
+class Overruns {
+ public:
+  /// `missed` ticks before this one, which is `tick`.
+  void take(std::int64_t tick, std::int64_t missed) noexcept;
+  bool good(const SafetyLimits& limits, std::int64_t ticks_per_second) const noexcept;
+
+ private:
+  static constexpr std::size_t kKept = 64;  // [-] more than any limit
+  std::array<std::int64_t, kKept> late_{};  // ticks, a ring
+  std::size_t count_ = 0;                   // [-] so far
+  std::int64_t missed_ = 0;                 // [-] before the last tick
+  std::int64_t tick_ = 0;
+};
+
+/// Energy of the emulated base, while the robot stands still: a sampled, lagging loop can feed it
+/// (Appendix E), and then it grows window after window.
+class Oscillation {
+ public:
+  static constexpr double kWindow = 0.5;  // [s]
+  static constexpr double kGrowth = 1.2;  // [-] of a window over the last
+
+  /// `energy` [J]; `q` the robot's joints, `moved` [rad | m] what counts as moving.
+  void take(double energy, const JointVector& q, double moved, double period,
+            double floor) noexcept;
+  void reset() noexcept { *this = Oscillation(); }
+  bool good(const SafetyLimits& limits) const noexcept { return grown_ < limits.growing_windows; }
+
+ private:
+  double time_ = 0.0;  // [s] in this window
+  double most_ = 0.0;  // [J] in this window
+  double last_ = 0.0;  // [J] in the one before
+  int grown_ = 0;      // [-] windows in a row
+  JointVector q_ = JointVector::Zero();
+};
+
+}  // namespace ves

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/control/monitors.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ves {
+
+const Vec6& LegReadings::take(const Vec6& L, const Vec6& speed, double time, double jump) noexcept {
+  // A servo catches up at more than the speed it was told, but not at half as much again.
+  constexpr double kCatchUp = 1.5;  // [-]
+  bool plausible = true;
+  for (int i = 0; i < kLegs; ++i)
+    plausible =
+        plausible && std::abs(L(i) - L_(i)) <= jump + kCatchUp * speed(i) * (wrong_ + 1) * time;
+  if (known_ && !plausible) {
+    ++wrong_;
+    return L_;
+  }
+  known_ = true;
+  wrong_ = 0;
+  L_ = L;
+  return L_;
+}
+
+void FrozenSensor::take(const AdcCounts& adc, const Vec6& expected) noexcept {
+  if (!std::equal(adc.begin(), adc.begin() + kWrenchChannels, last_.begin())) {
+    last_ = adc;
+    expected_ = expected;
+    same_ = 0;
+  } else {
+    ++same_;
+  }
+  change_ = (expected - expected_).cwiseAbs().maxCoeff();
+}
+
+void Overruns::take(std::int64_t tick, std::int64_t missed) noexcept {
+  tick_ = tick;
+  missed_ = missed;
+  if (missed > 0) late_[count_++ % kKept] = tick;
+}
+
+bool Overruns::good(const SafetyLimits& limits, std::int64_t ticks_per_second) const noexcept {
+  if (missed_ > limits.stall_ticks) return false;
+  const auto allowed = static_cast<std::size_t>(limits.overruns);
+  if (allowed >= kKept || count_ <= allowed) return true;
+  // The one that would be too many, counted back from the last.
+  return tick_ - late_[(count_ - 1 - allowed) % kKept] > ticks_per_second;
+}
+
+void Oscillation::take(double energy, const JointVector& q, double moved, double period,
+                       double floor) noexcept {
+  if (!((q - q_).cwiseAbs().maxCoeff() <= moved)) {
+    reset();
+    q_ = q;
+  }
+  most_ = std::max(most_, energy);
+  time_ += period;
+  if (time_ < kWindow) return;
+  grown_ = most_ > kGrowth * last_ && most_ > floor && last_ > 0.0 ? grown_ + 1 : 0;
+  last_ = most_;
+  most_ = 0.0;
+  time_ = 0.0;
+}
+
+}  // namespace ves
