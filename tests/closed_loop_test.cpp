@@ -218,7 +218,7 @@ TEST_F(ClosedLoop, SwitchStopsTheRunAndLeavesItsName) {
   const Series series = run(experiment(
       "z_sine",
       {"program=[{move: {}}, {trajectory: {duration_s: 3, z: {sine: {amplitude_m: 0.1, "
-       "frequency_hz: 0.5}}}, switches: [{at_s: 1.0, duration_s: 0.2, switch: floor_mat}]}]"}));
+       "frequency_hz: 0.5}}}, faults: [{at_s: 1.0, duration_s: 0.2, fault: floor_mat}]}]"}));
   EXPECT_FALSE(result_.good());
   EXPECT_EQ(result_.cause, Check::kFloorMat);
   const auto summary = summarise(series, result_);

@@ -361,7 +361,7 @@ TEST(Plant, JointsFollowAFifthOrderPolynomial) {
 TEST(Plant, CuesCountFromTheSegmentsFirstCommand) {
   Experiment e = experiment("puma_on_table_4_1");
   e.plant.robot_events = {{{2, 500'000'000}, {0, 0.5, 1.0}}};
-  e.plant.switch_events = {{{2, 300'000'000}, 100'000'000, kFloorMatClosed}};
+  e.plant.faults = {{{2, 300'000'000}, 100'000'000, plant::Fault::kFloorMat}};
   Plant plant(e.plant);
   LegCommand command;
   command.engaged = true;

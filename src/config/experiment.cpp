@@ -273,8 +273,8 @@ class ProgramReader {
       readSegment(item, segment);
       if (item.has("robot"))
         for (Section event : item.list("robot")) readRobotEvent(event);
-      if (item.has("switches"))
-        for (Section event : item.list("switches")) readSwitchEvent(event);
+      if (item.has("faults"))
+        for (Section event : item.list("faults")) readFault(event);
       item.finish();
       ++out_.controller.program.size;
     }
@@ -283,7 +283,7 @@ class ProgramReader {
  private:
   void readSegment(Section& item, Segment& segment) {
     const std::string kind = item.onlyKey(
-        {"calibration", "move", "trajectory", "admittance", "watch"}, {"robot", "switches"});
+        {"calibration", "move", "trajectory", "admittance", "watch"}, {"robot", "faults"});
     Section s = item.section(kind);
     if (kind == "calibration") {
       segment.kind = SegmentKind::kCalibration;
@@ -345,15 +345,35 @@ class ProgramReader {
     out_.plant.robot_events.push_back(event);
   }
 
-  void readSwitchEvent(Section& s) {
-    plant::SwitchEvent event;
+  void readFault(Section& s) {
+    using plant::Fault;
+    plant::FaultEvent event;
     event.cue = {out_.controller.program.size, readTime(s, "at_s")};
     event.duration = readTime(s, "duration_s");
-    event.switches = s.choice("switch", {"panic_button", "floor_mat"}) == "panic_button"
-                         ? kPanicButtonClosed
-                         : kFloorMatClosed;
+    std::vector<std::string_view> names;
+    for (int i = 0; i < static_cast<int>(Fault::kCount); ++i)
+      names.push_back(plant::name(static_cast<Fault>(i)));
+    const std::string fault = s.text("fault");
+    const auto at = std::find(names.begin(), names.end(), fault);
+    if (at == names.end())
+      s.fail("fault", fmt::format("'{}', want one of {}", fault, fmt::join(names, ", ")));
+    event.fault = static_cast<Fault>(at - names.begin());
+    switch (event.fault) {
+      case Fault::kWrenchStep:
+      case Fault::kLegJump: event.amount = s.number("counts", -65536.0, 65536.0); [[fallthrough]];
+      case Fault::kWrenchRail:
+      case Fault::kLegFrozen:
+      case Fault::kLegOutOfRange:
+      case Fault::kValveStuck:
+      case Fault::kRunaway:  // from 1, as the legs and channels are called
+        event.index = static_cast<int>(s.integer("which", 1, 6)) - 1;
+        break;
+      case Fault::kPressure: event.amount = s.number("volts", -10.0, 10.0); break;
+      case Fault::kLate: event.amount = static_cast<double>(s.integer("samples", 1, 15)); break;
+      default: break;
+    }
     s.finish();
-    out_.plant.switch_events.push_back(event);
+    out_.plant.faults.push_back(event);
   }
 
   const UrdfRobot* robot_;
@@ -420,7 +440,12 @@ Experiment build(const Value& document) {
   controller.finish();
 
   c.geometry = readGeometry(root.section("platform"));
-  const Legs legs = readLegs(root.section("legs"));
+  Section leg_section = root.section("legs");
+  Section watchdog = leg_section.section("watchdog");
+  p.watchdog.park_after = readTime(watchdog, "park_after_s");
+  p.watchdog.park_time = std::max<std::int64_t>(1, readTime(watchdog, "park_time_s"));
+  watchdog.finish();
+  const Legs legs = readLegs(leg_section);
   c.legs = legs.codec;
   const Sensor sensor = readSensor(root.section("sensor"));
   c.sensor = {sensor.model.S_proc().inverse(), sensor.X_PS};

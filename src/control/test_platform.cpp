@@ -45,7 +45,12 @@ TestPlatform::TestPlatform(const ControllerConfig& config)
   state_.bias = config.bias;
 }
 
-const TickState& TestPlatform::tick(const TickInput& in) noexcept {
+const TickState& TestPlatform::tick(const TickInput& input) noexcept {
+  // An older sample than the last is none. Before arming the machine may begin anew.
+  TickInput in = input;
+  if (state_.command.engaged && in.sample.sequence < sample_.sequence) in.sample = sample_;
+  sample_ = in.sample;
+
   readSample(in);
   measureWrench(in.sample);  // force measurement, gravity compensation
   if (in.order.request != Request::kNone) {

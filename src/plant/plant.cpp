@@ -46,7 +46,10 @@ Plant::Plant(const PlantConfig& config)
     paths_[static_cast<std::size_t>(i)].path = Quintic<1>(rest, q, 1.0);
   }
   robot_event_done_.assign(config_.robot_events.size(), false);
+  injectors_.resize(config_.faults.size());
+  const Vec6 L_home = legLengths(config_.geometry, config_.geometry.fromHome({}));
   for (int i = 0; i < kLegs; ++i) {
+    home_[static_cast<std::size_t>(i)] = config_.transducer.count(L_home(i));
     const double L = truth_.legs.L(i);
     const std::int32_t count = config_.transducer.count(L);
     actuators_.emplace_back(config_.actuator, L);
@@ -62,6 +65,9 @@ Plant::Plant(const PlantConfig& config)
 void Plant::command(const LegCommand& command) noexcept {
   if (!command.engaged) return;
   reference_ = command.counts;
+  heard_ = now_;
+  may_park_ = command.park;
+  truth_.parking = false;
   if (command.segment == segment_) return;
   if (command.segment < segment_) robot_event_done_.assign(robot_event_done_.size(), false);
   segment_ = command.segment;
@@ -121,6 +127,7 @@ void Plant::skip(std::int64_t until) noexcept {
   const std::int64_t time = (until - now_ - 1'000'000'000) / kUpdatePeriod * kUpdatePeriod;
   now_ += time;
   last_look_ += time;
+  if (heard_ != kNever) heard_ += time;  // who asks for such a leap would have gone on commanding
   next_reading_ += time;
   if (next_look_ != kNever) next_look_ += time;
 }
@@ -153,11 +160,50 @@ void Plant::moveActuators(std::int64_t to) noexcept {
   if (to <= now_) return;
   const double dt = seconds(to - now_);
   const double decay = std::exp(-dt / config_.actuator.tau);
-  for (std::size_t i = 0; i < kLegs; ++i) actuators_[i].advance(slaves_[i].current(), dt, decay);
+  for (std::size_t i = 0; i < kLegs; ++i) actuators_[i].advance(current(i), dt, decay);
   now_ = to;
 }
 
+/// A cue's time has come, and not yet gone.
+bool Plant::now(const Cue& cue, std::int64_t duration) const noexcept {
+  const std::int64_t start = segment_start_ + cue.after;
+  return cue.segment == segment_ && now_ >= start && now_ < start + duration;
+}
+
+/// [A] through a valve.
+double Plant::current(std::size_t leg) const noexcept {
+  double amperes = slaves_[leg].current();
+  for (const FaultEvent& event : config_.faults) {
+    if (static_cast<std::size_t>(event.index) != leg || !now(event.cue, event.duration)) continue;
+    if (event.fault == Fault::kValveStuck) amperes = 0.0;
+    if (event.fault == Fault::kRunaway)
+      amperes = LegSlave::kFullScale * LegSlave::kVoltsPerDigit * LegSlave::kAmperesPerVolt;
+  }
+  return amperes;
+}
+
+/// The LegSlaves' own watchdog.
+void Plant::watch() noexcept {
+  if (heard_ == kNever || now_ - heard_ < config_.watchdog.park_after) return;
+  if (!may_park_ || !loops_closed_) {
+    truth_.parking = false;
+    return;
+  }
+  if (!truth_.parking) {
+    truth_.parking = true;
+    parked_from_ = reference_;
+    heard_ = now_ - config_.watchdog.park_after;
+  }
+  const std::int64_t since = now_ - heard_ - config_.watchdog.park_after;
+  const double share =
+      std::min(1.0, static_cast<double>(since) / static_cast<double>(config_.watchdog.park_time));
+  for (std::size_t i = 0; i < kLegs; ++i)
+    reference_[i] = parked_from_[i] +
+                    static_cast<std::int32_t>(std::lround(share * (home_[i] - parked_from_[i])));
+}
+
 void Plant::readTransducers() noexcept {
+  watch();
   for (std::size_t i = 0; i < kLegs; ++i)
     slaves_[i].read(config_.transducer.count(actuators_[i].length()), reference_[i]);
   if (slaves_[0].updated()) next_look_ = now_ + kMidUpdate;
@@ -236,11 +282,11 @@ Sample Plant::sample() noexcept {
   }
   s.q = truth_.joints.q;
   s.switches = kAllSwitchesClosed;
-  for (const SwitchEvent& event : config_.switch_events) {
-    const std::int64_t start = segment_start_ + event.cue.after;
-    if (event.cue.segment == segment_ && now_ >= start && now_ < start + event.duration)
-      s.switches &= ~event.switches;
+  for (std::size_t i = 0; i < config_.faults.size(); ++i) {
+    const FaultEvent& event = config_.faults[i];
+    injectors_[i].apply(event, now(event.cue, event.duration), config_.sensor.volts_per_count, s);
   }
+  loops_closed_ = (s.switches & kAllSwitchesClosed) == kAllSwitchesClosed;
   return s;
 }
 

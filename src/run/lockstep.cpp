@@ -34,10 +34,12 @@ RunResult runLockstep(const Experiment& experiment, LogWriter* log, const Watch&
   in.order.request = first;
   std::int64_t orders = 0;
   for (;;) {
-    in.sample = plant.sample();
+    const sample_t sent = toMessage(plant.sample(), machine, in.tick - 1);
     record(channel::kTruth,
-           toMessage(plant.truth(), header(machine, in.sample.sequence, plant.time())));
-    record(channel::kSample, toMessage(in.sample, machine, in.tick - 1));
+           toMessage(plant.truth(), header(machine, sent.header.sequence, plant.time())));
+    record(channel::kSample, sent);
+    // The same gate as on the bus: what is not let in was not there.
+    if (const auto sample = fromMessage(sent)) in.sample = *sample;
 
     const TickState& state = platform.tick(in);
     const header_t h = header(controller, in.tick, plant.time());

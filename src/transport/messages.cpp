@@ -153,6 +153,7 @@ truth_t toMessage(const plant::Truth& truth, const header_t& header) noexcept {
   put(truth.legs.L, m.leg);
   put(truth.legs.L_dot, m.leg_dot);
   put(truth.current, m.current);
+  m.parking = truth.parking ? 1 : 0;
   m.legs_agree = truth.legs_agree ? 1 : 0;
   return m;
 }

@@ -118,7 +118,7 @@ class TestPlatform {
   explicit TestPlatform(const ControllerConfig& config);
 
   /// One period. Bounded, and free of heap, locks, clocks, logs and exceptions.
-  const TickState& tick(const TickInput& in) noexcept;
+  const TickState& tick(const TickInput& input) noexcept;
 
   /// Parked, or stopped by a check.
   bool done() const noexcept {
@@ -177,6 +177,7 @@ class TestPlatform {
   Quintic<6> bias_path_;     // [count] of a tare
   std::int64_t tare_n_ = 0;  // [-] ticks since it began
   TickState state_;
+  Sample sample_;  // the last
   Transform X_IP_measured_;
   bool legs_solved_ = false;       // forward kinematics found the pose of this sample
   int fresh_ticks_ = 0;            // [-] consecutive ticks with a new sample and no rival

@@ -17,6 +17,7 @@
 #include "ves/control/sample.hpp"
 #include "ves/math/quintic.hpp"
 #include "ves/plant/actuator.hpp"
+#include "ves/plant/faults.hpp"
 #include "ves/plant/force_torque_sensor.hpp"
 #include "ves/plant/leg_slave.hpp"
 #include "ves/robot/newton_euler.hpp"
@@ -37,22 +38,17 @@ struct RobotMove {
   double duration = 1.0;  // [s]
 };
 
-/// When something happens: `after` the controller's program reached `segment`.
-struct Cue {
-  int segment = 0;         // [-]
-  std::int64_t after = 0;  // [ns]
-};
-
 struct RobotEvent {
   Cue cue;
   RobotMove move;
 };
 
-/// A safety loop held open for `duration`.
-struct SwitchEvent {
-  Cue cue;
-  std::int64_t duration = 0;   // [ns]
-  std::uint32_t switches = 0;  // bits of Switch
+/// What the LegSlaves do when commands stop coming: they keep their last reference, and after a
+/// while go slowly home, unless the last command told them to stay or a safety loop is open. Each
+/// by itself: every board knows its own length at home, and all take the same time.
+struct Watchdog {
+  std::int64_t park_after = 10'000'000'000;  // [ns] of silence
+  std::int64_t park_time = 20'000'000'000;   // [ns]
 };
 
 /// Temperature of the laboratory: mean + swing/2 sin(2 pi (t - rising)/period).
@@ -78,7 +74,8 @@ struct PlantConfig {
   Vec3 gravity = {0.0, 0.0, -9.81};  // [m/s^2] g_I
   JointVector initial_joints = JointVector::Zero();
   std::vector<RobotEvent> robot_events;
-  std::vector<SwitchEvent> switch_events;
+  std::vector<FaultEvent> faults;
+  Watchdog watchdog;
   std::uint32_t seed = 1;
 };
 
@@ -92,6 +89,7 @@ struct Truth {
   LegMotion legs;               // of the actuators, unfiltered
   Vec6 current = Vec6::Zero();  // [A] valves
   bool legs_agree = true;       // forward kinematics found a pose
+  bool parking = false;         // the LegSlaves go home by themselves
 };
 
 class Plant {
@@ -125,6 +123,9 @@ class Plant {
   bool still() const noexcept;
   void skip(std::int64_t until) noexcept;
   void moveActuators(std::int64_t to) noexcept;
+  void watch() noexcept;
+  bool now(const Cue& cue, std::int64_t duration) const noexcept;
+  double current(std::size_t leg) const noexcept;
   void readTransducers() noexcept;
   void look() noexcept;
   JointState jointsNow() const noexcept;
@@ -154,6 +155,11 @@ class Plant {
   std::int64_t segment_ = -1;               // of the last command
   std::int64_t segment_start_ = 0;          // [ns]
   std::int64_t next_robot_event_ = kNever;  // [ns]
+  std::int64_t heard_ = kNever;             // [ns] the last command to follow; kNever: none yet
+  bool may_park_ = false;
+  bool loops_closed_ = true;  // in the last sample
+  LegCounts home_{}, parked_from_{};
+  std::vector<Injector> injectors_;  // one a fault
   std::vector<bool> robot_event_done_;
   struct JointPath {
     std::int64_t start = 0;  // [ns]
