@@ -32,6 +32,8 @@ const std::map<std::string, Names> kMayInclude = {
      {"math", "kinematics", "robot", "control", "plant", "config", "transport", "realtime"}},
     {"report",
      {"math", "kinematics", "robot", "control", "plant", "config", "transport", "realtime", "run"}},
+    {"faults",
+     {"math", "kinematics", "robot", "control", "plant", "config", "transport", "realtime", "run"}},
     {"console",
      {"math", "kinematics", "robot", "control", "plant", "config", "transport", "realtime", "run",
       "report"}},

@@ -47,6 +47,7 @@ Plant::Plant(const PlantConfig& config)
   }
   robot_event_done_.assign(config_.robot_events.size(), false);
   injectors_.resize(config_.faults.size());
+  began_.fill(kNever);
   const Vec6 L_home = legLengths(config_.geometry, config_.geometry.fromHome({}));
   for (int i = 0; i < kLegs; ++i) {
     home_[static_cast<std::size_t>(i)] = config_.transducer.count(L_home(i));
@@ -69,9 +70,13 @@ void Plant::command(const LegCommand& command) noexcept {
   may_park_ = command.park;
   truth_.parking = false;
   if (command.segment == segment_) return;
-  if (command.segment < segment_) robot_event_done_.assign(robot_event_done_.size(), false);
+  if (command.segment < segment_) {  // a program begins anew
+    robot_event_done_.assign(robot_event_done_.size(), false);
+    began_.fill(kNever);
+  }
   segment_ = command.segment;
   segment_start_ = now_;
+  if (segment_ >= 0) began_[static_cast<std::size_t>(segment_)] = now_;
   planRobotEvent();
 }
 
@@ -166,8 +171,9 @@ void Plant::moveActuators(std::int64_t to) noexcept {
 
 /// A cue's time has come, and not yet gone.
 bool Plant::now(const Cue& cue, std::int64_t duration) const noexcept {
-  const std::int64_t start = segment_start_ + cue.after;
-  return cue.segment == segment_ && now_ >= start && now_ < start + duration;
+  const std::int64_t began = began_[static_cast<std::size_t>(cue.segment)];
+  if (began == kNever || now_ - began < cue.after) return false;
+  return now_ - began - cue.after < duration;
 }
 
 /// [A] through a valve.

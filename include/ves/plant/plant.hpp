@@ -14,6 +14,7 @@
 
 #include <vector>
 
+#include "ves/control/program.hpp"
 #include "ves/control/sample.hpp"
 #include "ves/math/quintic.hpp"
 #include "ves/plant/actuator.hpp"
@@ -152,10 +153,11 @@ class Plant {
   std::int64_t next_reading_ = kTransducerPeriod;  // [ns]
   std::int64_t next_look_ = 0;                     // [ns]
   std::int64_t sequence_ = -1;
-  std::int64_t segment_ = -1;               // of the last command
-  std::int64_t segment_start_ = 0;          // [ns]
-  std::int64_t next_robot_event_ = kNever;  // [ns]
-  std::int64_t heard_ = kNever;             // [ns] the last command to follow; kNever: none yet
+  std::int64_t segment_ = -1;                           // of the last command
+  std::int64_t segment_start_ = 0;                      // [ns]
+  std::array<std::int64_t, kMaxSegments + 1> began_{};  // [ns] each segment; kNever: not yet
+  std::int64_t next_robot_event_ = kNever;              // [ns]
+  std::int64_t heard_ = kNever;  // [ns] the last command to follow; kNever: none yet
   bool may_park_ = false;
   bool loops_closed_ = true;  // in the last sample
   LegCounts home_{}, parked_from_{};

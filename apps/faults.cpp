@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// ves faults: injects every fault of the table and says what happened.
+#include "app.hpp"
+#include "ves/faults/table.hpp"
+
+namespace ves::app {
+namespace {
+
+void printRow(const FaultRow& row, const Seen& seen) {
+  std::string detected = "-", deviation = "-";
+  if (seen.ticks >= 0)
+    detected = fmt::format("{} ({:.0f} ms)", seen.ticks,
+                           static_cast<double>(seen.ticks) * seen.period * 1e3);
+  if (seen.peak_deviation >= 0.0) deviation = fmt::format("{:.1f} mm", seen.peak_deviation * 1e3);
+  fmt::print(
+      "{:<5} {} {}\n        expected  {}\n        seen      {}\n        detected  {:<14} "
+      "peak deviation  {}\n",
+      row.id, seen.as_expected ? "ok  " : "MISS", row.fault, row.expected, seen.what, detected,
+      deviation);
+  std::fflush(stdout);
+}
+
+void printMarkdownRow(const FaultRow& row, const Seen& seen) {
+  fmt::print("| {} | {} | {} | {}{} | {} | {} |\n", row.id, row.fault, row.expected,
+             seen.as_expected ? "" : "**not as expected:** ", seen.what,
+             seen.ticks < 0 ? std::string("-")
+                            : fmt::format("{} / {:.0f} ms", seen.ticks,
+                                          static_cast<double>(seen.ticks) * seen.period * 1e3),
+             seen.peak_deviation < 0.0 ? std::string("-")
+                                       : fmt::format("{:.1f}", seen.peak_deviation * 1e3));
+  std::fflush(stdout);
+}
+
+int kill(const std::filesystem::path& config, const std::filesystem::path& programs, int times) {
+  const auto rows = faultTable(config, programs);
+  const auto row = std::find_if(rows.begin(), rows.end(),
+                                [](const FaultRow& r) { return std::string(r.id) == "F15"; });
+  int good = 0;
+  for (int i = 0; i < times && !stop_requested; ++i) {
+    good += row->run().as_expected;
+    fmt::print(stderr, "\r  {} of {} killings ended with the legs at rest", good, i + 1);
+  }
+  fmt::print(stderr, "\n");
+  return good == times ? kDone : kTripped;
+}
+
+}  // namespace
+}  // namespace ves::app
+
+int main(int argc, char** argv) {
+  using namespace ves;
+  CLI::App cli(
+      "Injects every fault of the table, most in lockstep, some into real processes, and says "
+      "what was expected and what happened. Status 1 when a row is not as expected.",
+      "ves faults");
+  std::vector<std::string> only;
+  bool lockstep = false, list = false, markdown = false;
+  std::int64_t ticks = 0;
+  std::uint32_t seed = 1;
+  int times = 0;
+  cli.add_option("names", only, "rows, as F3 F12; all by default");
+  cli.add_flag("--lockstep", lockstep, "leave out the rows with real processes");
+  cli.add_flag("--list", list, "only the faults and what is expected");
+  cli.add_flag("--markdown", markdown, "as a table for a page");
+  cli.add_option("--soak", ticks, "instead: so many ticks of random faults and recoveries")
+      ->check(CLI::Range(std::int64_t{1}, std::int64_t{1'000'000'000'000}));
+  cli.add_option("--seed", seed, "of the soak");
+  cli.add_option("--kill", times, "instead: kill a controller at so many random moments")
+      ->check(CLI::Range(1, 100'000));
+  return app::run(cli, argc, argv, [&] {
+    const char* given = std::getenv("VES_CONFIG_DIR");
+    const std::filesystem::path config = given ? given : "config";
+    const auto programs = std::filesystem::read_symlink("/proc/self/exe").parent_path();
+    app::catchSignals();
+    if (ticks > 0) {
+      const SoakResult r = soak(config, ticks, seed, [&](std::int64_t done) {
+        fmt::print(stderr, "\r  {:.1f} of {:.1f} million ticks", static_cast<double>(done) * 1e-6,
+                   static_cast<double>(ticks) * 1e-6);
+      });
+      fmt::print(stderr, "\n");
+      fmt::print("{} ticks, {} faults, {} stops, {} recoveries, hash {:016x}{}\n", r.ticks,
+                 r.faults, r.stops, r.recoveries, r.hash,
+                 r.violated.empty() ? "" : "\nVIOLATED " + r.violated);
+      return r.violated.empty() ? app::kDone : app::kTripped;
+    }
+    const auto rows = faultTable(config, programs);
+    for (const std::string& id : only)
+      if (std::none_of(rows.begin(), rows.end(), [&](const FaultRow& r) { return id == r.id; }))
+        throw InputError(fmt::format("'{}': no such row, want F1 to F38 as --list names them", id));
+    if (!list && !lockstep) enterPrivateBus();
+    if (times > 0) return app::kill(config, programs, times);
+    if (markdown)
+      fmt::print(
+          "| | fault | expected | seen | detected [ticks / time] | peak deviation [mm] |\n"
+          "|---|---|---|---|---|---|\n");
+    int missed = 0, ran = 0;
+    for (const FaultRow& row : rows) {
+      if (!only.empty() && std::find(only.begin(), only.end(), row.id) == only.end()) continue;
+      if (list) {
+        fmt::print("{:<5} {}\n        {}\n", row.id, row.fault, row.expected);
+        continue;
+      }
+      if ((lockstep && row.processes) || app::stop_requested) continue;
+      const Seen seen = row.run();
+      (markdown ? app::printMarkdownRow : app::printRow)(row, seen);
+      ++ran;
+      missed += !seen.as_expected;
+    }
+    if (!list && !markdown) fmt::print("{} of {} rows as expected\n", ran - missed, ran);
+    return missed == 0 ? app::kDone : app::kTripped;
+  });
+}
