@@ -88,6 +88,8 @@ int main(int argc, char** argv) {
   cli.add_flag("--no-menu", options.no_menu, "wait for orders from the bus");
   cli.add_option("--log", options.process.log,
                  "record samples, states and commands (--lockstep, no menu)");
+  cli.add_option("--flight", options.process.flight,
+                 "folder for the last 5 s before a stop, as a log of their own (no menu)");
   cli.add_flag("!--no-plots", options.plots, "leave the plots out");
   return app::run(cli, argc, argv, [&] {
     const bool alone = options.no_menu || options.process.start || options.process.lockstep;

@@ -154,6 +154,10 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"no_such_section", "z_sine", "robots.urdf_text=x", "robots: unknown key"},
         Bad{"empty_program", "z_sine", "program=[]", "program: has 0 segments"},
         Bad{"unknown_segment", "z_sine", "program=[{dance: {}}]", "program[0].dance: unknown"},
+        Bad{"unknown_fault", "z_sine",
+            "program=[{trajectory: {duration_s: 1}, faults: [{at_s: 0, duration_s: 1, fault: "
+            "gremlin}]}]",
+            "'gremlin', want one of wrench_frozen"},
         Bad{"two_kinds", "z_sine", "program=[{move: {}, calibration: {}}]",
             "want only one of them"},
         Bad{"sine_without_frequency", "z_sine",

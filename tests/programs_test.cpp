@@ -90,6 +90,22 @@ TEST_F(Programs, RealTimeRunOfTwoProcesses) {
   EXPECT_TRUE(s.contains("wake_up_late_median_s"));
 }
 
+TEST_F(Programs, AStopLeavesItsLastSecondsAsALog) {
+  const Output o = run(
+      "z_sine --private-bus --no-plots " + patient() + out("a") +
+      " --set 'program=[{trajectory: {duration_s: 8, z: {sine: {amplitude_m: 0.05, frequency_hz: "
+      "0.5}}}, faults: [{at_s: 6, duration_s: 2, fault: floor_mat}]}]'");
+  EXPECT_EQ(o.status, 1) << o.text;
+  EXPECT_EQ(summary(folder_ / "a")["first_cause"], "floor mat");
+  std::string record;
+  for (const auto& entry : fs::directory_iterator(folder_ / "a"))
+    if (entry.path().filename().string().rfind("flight-", 0) == 0) record = entry.path();
+  ASSERT_FALSE(record.empty());
+  const Output rows = sh(app("collect") + record + " --select phase");
+  EXPECT_EQ(rows.status, 0) << rows.text;
+  EXPECT_EQ(std::count(rows.text.begin(), rows.text.end(), '\n'), 501);  // 5 s, and the header
+}
+
 TEST_F(Programs, ReplayRefusesWhatIsNoLog) {
   std::ofstream(folder_ / "empty").close();
   std::ofstream(folder_ / "text") << "this is not an event log, by its first byte";

@@ -414,5 +414,85 @@ TEST(Safety, WhatTheLoopFeedsIsStoppedBeforeItIsLarge) {
   EXPECT_LT(largest, 0.05);
 }
 
+// --- Silent legs ---------------------------------------------------------------------------------
+
+class Silence : public testing::Test {
+ protected:
+  Silence()
+      : e_(experiment("z_sine", {"initial_pose={x_m: 0.05, z_m: 0.08, gamma_deg: 3}"})),
+        plant_(e_.plant) {
+    LegCommand c;
+    c.engaged = true;
+    c.park = true;
+    c.counts =
+        legCounts(e_.controller.legs,
+                  legLengths(e_.plant.geometry, e_.plant.geometry.fromHome(e_.plant.initial_pose)));
+    command_ = c;
+  }
+  double away() {
+    plant_.sample();
+    return plant_.truth().x.stacked().norm();
+  }
+  static constexpr std::int64_t kSecond = 1'000'000'000;
+  /// In steps: a leap of the plant's time would count as time that was commanded.
+  void wait(int seconds) {
+    for (int s = 0; s < seconds; ++s) plant_.advance(plant_.time() + kSecond);
+  }
+  Experiment e_;
+  plant::Plant plant_;
+  LegCommand command_;
+};
+
+TEST_F(Silence, LegsHoldAndThenGoHomeSlowly) {
+  plant_.command(command_);
+  const double start = away();
+  for (int s = 1; s < 10; ++s) {
+    plant_.advance(s * kSecond);
+    EXPECT_NEAR(away(), start, 1e-3) << s;
+  }
+  double fastest = 0.0;
+  for (std::int64_t t = 10 * kSecond; t < 31 * kSecond; t += kSecond / 100) {
+    plant_.advance(t);
+    plant_.sample();
+    fastest = std::max(fastest, plant_.truth().P.v.norm());
+  }
+  EXPECT_LT(away(), 1e-3);
+  EXPECT_LT(fastest, 0.05);
+  EXPECT_TRUE(plant_.truth().parking);
+}
+
+TEST_F(Silence, LegsStayWhenTheLastCommandSaidSo) {
+  command_.park = false;  // a stop by a check
+  plant_.command(command_);
+  const double start = away();
+  wait(40);
+  EXPECT_NEAR(away(), start, 1e-3);
+}
+
+TEST_F(Silence, LegsStayWhileASafetyLoopIsOpen) {
+  command_.segment = 0;
+  e_.plant.faults = {{{0, kSecond}, 100 * kSecond, plant::Fault::kPanicButton, 0, 0.0}};
+  plant::Plant plant(e_.plant);
+  plant.command(command_);
+  for (int s = 1; s < 40; ++s) {
+    plant.advance(s * kSecond);
+    plant.sample();
+  }
+  EXPECT_NEAR(plant.truth().x.stacked().norm(), e_.plant.initial_pose.stacked().norm(), 1e-3);
+}
+
+TEST_F(Silence, ACommandTakesTheLegsBackWithoutAStep) {
+  plant_.command(command_);
+  wait(20);
+  const Sample s = plant_.sample();
+  EXPECT_TRUE(plant_.truth().parking);
+  command_.counts = s.legs;
+  plant_.command(command_);
+  const double then = away();
+  wait(1);
+  EXPECT_NEAR(away(), then, 1e-3);
+  EXPECT_FALSE(plant_.truth().parking);
+}
+
 }  // namespace
 }  // namespace ves

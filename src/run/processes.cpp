@@ -3,6 +3,7 @@
 
 #include "ves/realtime/realtime.hpp"
 #include "ves/run/ending.hpp"
+#include "ves/run/flight_record.hpp"
 #include "ves/run/run.hpp"
 #include "ves/transport/channels.hpp"
 
@@ -29,6 +30,7 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
   Bus bus(options.url);
   ControllerLink link(bus, self);
   TestPlatform platform(experiment.controller);
+  FlightRecord flight(experiment, options.flight);
   Ending ending(experiment.controller, !options.start);
 
   std::unique_ptr<LogWriter> log;
@@ -72,6 +74,7 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
       const state_t told = toMessage(state, in, h);
       out = toMessage(state.command, h);
       bus.publish(channel::kState, told);
+      flight.keep(told, toMessage(in.sample, {}, in.tick - 1));
       if (log) {
         log->write(channel::kState, told, in.sample.time);
         log->write(channel::kLegCommand, out, in.sample.time);
@@ -108,7 +111,9 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
     const header_t h = header(self, in.tick, woke);
     link.send(toMessage(state.command, h));
     const std::int64_t sent = monotonicNow();
-    bus.publish(channel::kState, toMessage(state, in, h));
+    const state_t told = toMessage(state, in, h);
+    bus.publish(channel::kState, told);
+    flight.keep(told, toMessage(in.sample, {}, -1));
     timing_t timing;
     timing.header = h;
     timing.late_ns = ticker.late();

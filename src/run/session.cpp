@@ -43,6 +43,9 @@ Session::Session(const Experiment& experiment, const LaunchOptions& options)
   arguments.push_back(process.start ? "--start" : "--no-menu");
   if (process.lockstep && !process.log.empty())
     arguments.insert(arguments.end(), {"--log", process.log});
+  if (!process.log.empty())
+    arguments.insert(arguments.end(),
+                     {"--flight", std::filesystem::path(process.log).parent_path().string()});
   if (options.plant) plant_ = std::make_unique<Process>(options.programs / "ves-plant", shared);
   controller_ = std::make_unique<Process>(options.programs / "ves-controller", arguments);
 }

@@ -46,6 +46,7 @@ struct ProcessOptions {
   bool realtime = false;  // insist on SCHED_FIFO and locked memory
   bool start = false;     // the program at once; else the controller waits for orders
   std::string log;        // file, empty: none
+  std::string flight;     // folder of flight records, empty: none
 };
 
 /// The controller's process. Returns when the program is over, a check has stopped it, or the

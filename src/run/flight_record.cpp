@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/run/flight_record.hpp"
+
+#include <fmt/format.h>
+
+#include "ves/transport/channels.hpp"
+#include "ves/transport/event_log.hpp"
+
+namespace ves {
+
+FlightRecord::FlightRecord(const Experiment& experiment, std::filesystem::path folder)
+    : experiment_(experiment), folder_(std::move(folder)) {
+  const double period = static_cast<double>(experiment.controller.period) * kSecondPerNanosecond;
+  ticks_.reserve(static_cast<std::size_t>(kKept / period));
+}
+
+void FlightRecord::keep(const state_t& state, const sample_t& sample) {
+  if (folder_.empty()) return;
+  if (ticks_.size() < ticks_.capacity())
+    ticks_.push_back({state, sample});
+  else
+    ticks_[next_] = {state, sample};
+  next_ = (next_ + 1) % ticks_.capacity();
+  constexpr std::int64_t kMoment = 20;  // [-] ticks
+  if (state.phase == static_cast<int>(Phase::kStopped) && state.cause_tick != written_ &&
+      state.header.sequence - state.cause_tick >= kMoment) {
+    written_ = state.cause_tick;
+    write(state.cause_tick);
+  }
+}
+
+void FlightRecord::write(std::int64_t tick) const {
+  const std::string file = (folder_ / fmt::format("flight-{}.lcmlog", tick)).string();
+  try {
+    LogWriter log(file);
+    log.write(channel::kExperiment, describe(experiment_, {}, 0), 0);
+    const std::size_t oldest = ticks_.size() < ticks_.capacity() ? 0 : next_;
+    for (std::size_t i = 0; i < ticks_.size(); ++i) {
+      const Tick& t = ticks_[(oldest + i) % ticks_.size()];
+      log.write(channel::kSample, t.sample, t.state.header.time_ns);
+      log.write(channel::kState, t.state, t.state.header.time_ns);
+    }
+  } catch (const InputError& error) {
+    fmt::print(stderr, "controller: {}\n",
+               error.what());  // the platform stands; nothing depends on it
+  }
+}
+
+}  // namespace ves
