@@ -395,7 +395,8 @@ std::vector<FaultRow> faultTable(const fs::path& config, const fs::path& program
       [=] {
         Witness w;
         Pair pair(config, programs, "z_sine");
-        if (!pair.swinging(w)) return verdict(false, "never in swing");
+        if (!pair.swinging(w, 5 + static_cast<std::int64_t>(std::random_device{}() % 700)))
+          return verdict(false, "never in swing");
         pair.controller->signal(SIGKILL);
         pair.controller->wait();
         const bool rests = w.rests();
