@@ -38,7 +38,7 @@ TEST(Orders, ArmingHoldsTheMeasuredPoseUntilTold) {
   EXPECT_EQ(rig.run(300).motion.x, measured);
   EXPECT_EQ(rig.state().phase, Phase::kArmed);
   EXPECT_EQ(rig.tick(Request::kRun, sine(2, 0.02, 0.5, 2.0)).phase, Phase::kRunning);
-  EXPECT_EQ(rig.run(200).phase, Phase::kArmed);
+  EXPECT_EQ(rig.until(Phase::kArmed).phase, Phase::kArmed);
   EXPECT_EQ(rig.tick(Request::kStop).phase, Phase::kReturning);
   EXPECT_EQ(rig.until(Phase::kParked).phase, Phase::kParked);
   EXPECT_EQ(rig.state().motion.x.norm(), 0.0);
@@ -110,6 +110,75 @@ TEST(Orders, AResetWaitsForTheCauseAndNothingMovesByItself) {
   EXPECT_EQ(rig.run(500).phase, Phase::kDisarmed);
   const Vec6 measured = rig.arm().measured.stacked();
   EXPECT_EQ(rig.state().motion.x, measured);
+}
+
+TEST(Orders, ReleasingAButtonMovesNothing) {
+  Rig rig(experiment("z_sine"));
+  rig.run(20);
+  rig.disturb([](Sample& s) { s.switches = kFloorMatClosed; });
+  rig.run(2);
+  EXPECT_EQ(rig.tick(Request::kStart).refusal, Refusal::kCauseRemains);
+  rig.disturb(nullptr);
+  EXPECT_EQ(rig.run(300).phase, Phase::kDisarmed);
+  // Ordered just before it is pressed, while the stream is still young.
+  Rig young(experiment("z_sine"));
+  young.run(2);
+  EXPECT_EQ(young.tick(Request::kStart).refusal, Refusal::kNone);
+  young.disturb([](Sample& s) { s.switches = 0; });
+  young.run(2);
+  young.disturb(nullptr);
+  EXPECT_EQ(young.run(300).phase, Phase::kDisarmed);
+}
+
+TEST(Orders, ASegmentThatEndsInMotionBrakes) {
+  const Experiment e = experiment("z_sine");
+  for (const Segment& s : {sine(2, 0.2, 0.5, 4.0), sine(0, 0.1, 1.0, 2.0)}) {
+    Rig rig(e);
+    rig.arm();
+    rig.tick(Request::kRun, s);
+    rig.run(2);
+    Vec6 last = rig.state().motion.x_dot;
+    rig.until([&](const TickState& now) {
+      // No more than the sine itself asks for, or gentle braking with a quintic's peak.
+      EXPECT_LT((now.motion.x_dot - last).norm(), 0.06) << now.tick;
+      last = now.motion.x_dot;
+      return now.phase == Phase::kArmed;
+    });
+    EXPECT_EQ(rig.state().phase, Phase::kArmed);
+    EXPECT_EQ(rig.state().motion.x_dot.norm(), 0.0);
+  }
+}
+
+TEST(Orders, ARefusedCalibrationOfBeforeDoesNotEndALaterProgram) {
+  const Experiment e = experiment("ramp", {"controller.still.deviation_counts=0.001"});
+  Rig rig(e);
+  rig.arm();
+  rig.tick(Request::kRun, segment(SegmentKind::kCalibration));
+  rig.until(Phase::kArmed);
+  ASSERT_EQ(rig.state().calibration, Calibration::Status::kRefused);
+  rig.tick(Request::kStart);
+  int last = -1;
+  rig.until([&](const TickState& s) {
+    if (s.phase == Phase::kRunning) last = s.segment;
+    return s.phase == Phase::kReturning;
+  });
+  EXPECT_EQ(last, e.controller.program.size - 1);
+  EXPECT_FALSE(rig.state().cut_short);
+}
+
+TEST(Orders, AWatchInRealTimeIsNoOverrun) {
+  // Nothing is passed over there: every tick comes.
+  Rig rig(experiment("z_sine"));
+  rig.arm();
+  rig.tick(Request::kRun, sine(2, 0.1, 0.5, 2.0));
+  rig.until(Phase::kArmed);
+  Segment watch = segment(SegmentKind::kWatch, 20.0);
+  watch.interval = 60.0;
+  rig.tick(Request::kRun, watch);
+  for (int i = 0; i < 500; ++i) {
+    rig.in().tick -= rig.state().idle;
+    ASSERT_EQ(rig.tick().phase, Phase::kRunning) << name(rig.state().cause);
+  }
 }
 
 // --- Calibration ---------------------------------------------------------------------------------
@@ -238,6 +307,20 @@ TEST(Tare, MovesTheCommandedPoseByNothingWhenItIsApplied) {
   EXPECT_LT(largest.tail<3>().maxCoeff(), 0.01 * kDegree);
   EXPECT_LT(tared.run(1500).dynamic.f.norm(), 0.01 * felt);
   EXPECT_LT(tared.state().motion.x.norm(), 0.1 * twin.state().motion.x.norm() + 1e-3);
+}
+
+TEST(Tare, ForgetsWhatAFaultHasToldIt) {
+  Rig rig(experiment("puma_on_table_4_1"));
+  rig.arm();
+  rig.tick(Request::kRun, segment(SegmentKind::kCalibration));
+  const Vec6 bias = rig.until(Phase::kArmed).bias;
+  rig.tick(Request::kTare);
+  rig.run(30);
+  rig.disturb([](Sample& s) { s.adc[2] = 32767; });
+  rig.run(40);
+  EXPECT_EQ(rig.state().phase, Phase::kStopped);
+  rig.disturb(nullptr);
+  EXPECT_EQ(rig.run(300).bias, bias);
 }
 
 // --- Logs of orders ------------------------------------------------------------------------------

@@ -412,6 +412,8 @@ TEST(Safety, WhatTheLoopFeedsIsStoppedBeforeItIsLarge) {
   EXPECT_EQ(rig.state().phase, Phase::kStopped);
   EXPECT_EQ(rig.state().cause, Check::kOscillation) << name(rig.state().cause);
   EXPECT_LT(largest, 0.05);
+  rig.run(50);
+  EXPECT_EQ(rig.tick(Request::kReset).phase, Phase::kDisarmed);
 }
 
 // --- Silent legs ---------------------------------------------------------------------------------

@@ -454,7 +454,7 @@ class Console {
   void obeyScript() {
     for (std::size_t i = 0; i < script_.size() && !over() && !failed_; ++i) {
       say("> " + options_.commands[i]);
-      const bool arms = script_[i].verb == Verb::kArm;
+      const bool arms = script_[i].verb == Verb::kArm || script_[i].verb == Verb::kProgram;
       if (!obey(script_[i])) return;
       const auto settled = [&] {
         const auto& s = session_->state();

@@ -15,6 +15,14 @@ PathPoint<6> atRest(const Vec6& x) {
   return point;
 }
 
+/// More is wrong than that the stream of samples has not begun.
+bool forbids(Tripped tripped) {
+  Tripped waiting;
+  waiting.require(Check::kStale, false);
+  waiting.require(Check::kOverrun, false);
+  return (tripped.bits() & ~waiting.bits()) != 0;
+}
+
 double brakeTime(const Vec6& v, const ControllerConfig::Braking& braking) {
   return std::max(v.head<3>().norm() / braking.translation, v.tail<3>().norm() / braking.rotation);
 }
@@ -92,10 +100,12 @@ void TestPlatform::readSample(const TickInput& in) noexcept {
   const int age_before = state_.age;
   state_.age = fresh ? 0 : state_.age + 1;
   fresh_ticks_ = fresh && !in.rival ? fresh_ticks_ + 1 : 0;
-  const std::int64_t missed = state_.count < 0 ? 0 : in.tick - state_.tick - state_.idle - 1;
+  // Idle ticks are passed over in lockstep only.
+  const std::int64_t between = state_.count < 0 ? 0 : in.tick - state_.tick - 1;
+  const std::int64_t missed = between >= state_.idle ? between - state_.idle : between;
   overruns_.take(in.tick, missed);
   if (missed > 0) ++state_.late_ticks;
-  const auto waited = static_cast<double>(age_before + missed + 1) * period_;
+  const auto waited = static_cast<double>(age_before + between + 1) * period_;
   state_.tick = in.tick;
   ++state_.count;
   state_.sample_sequence = sample.sequence;
@@ -132,6 +142,7 @@ Refusal TestPlatform::obey(const Order& order) noexcept {
     case Request::kArm:
     case Request::kStart:
       if (phase == Phase::kDisarmed) {
+        if (forbids(state_.tripped)) return Refusal::kCauseRemains;
         wish_ = order.request;
         attended_ = order.request == Request::kArm;
         return Refusal::kNone;
@@ -150,6 +161,7 @@ Refusal TestPlatform::obey(const Order& order) noexcept {
       if (phase != Phase::kArmed) return Refusal::kBusy;
       return accept(order.segment);
     case Request::kHold:
+      wish_ = Request::kNone;
       if (!ours) return Refusal::kNotArmed;
       if (phase != Phase::kArmed) hold();
       attended_ = true;
@@ -185,6 +197,7 @@ Refusal TestPlatform::accept(const Segment& segment) noexcept {
     return Refusal::kNone;
   constexpr std::int64_t kLooks = 1000;  // [-] along the path
   const std::int64_t stride = std::max<std::int64_t>(1, steps_ / kLooks);
+  Vec6 L_last = state_.legs.L;
   for (std::int64_t n = 0; n <= steps_; n += stride) {
     const PathPoint<6> at =
         segment.kind == SegmentKind::kMove
@@ -193,9 +206,15 @@ Refusal TestPlatform::accept(const Segment& segment) noexcept {
     const BodyMotion P = bodyMotion(config_.geometry, Pose::from(at.x), at.x_dot, at.x_ddot);
     const LegMotion legs = legMotion(config_.geometry, P);
     Tripped t = pathChecks(P.X, Pose::from(at.x), legs.L);
-    const Vec6 L_next = legs.L + period_ * legs.L_dot;
-    t.require(Check::kVelocity, velocityCheck(config_.safety, L_next, legs.L, period_));
-    t.require(Check::kFlow, flowLimitsCheck(config_.safety, L_next, legs.L, period_));
+    // From one look to the next, and at the look itself.
+    const double since = static_cast<double>(n == 0 ? 1 : stride) * period_;
+    const auto moves = [&](const Vec6& to, const Vec6& from, double time) {
+      t.require(Check::kVelocity, velocityCheck(config_.safety, to, from, time));
+      t.require(Check::kFlow, flowLimitsCheck(config_.safety, to, from, time));
+    };
+    moves(legs.L, L_last, since);
+    moves(legs.L + period_ * legs.L_dot, legs.L, period_);
+    L_last = legs.L;
     if (!t.any()) continue;
     state_ = before;
     state_.refused_by = t.first();
@@ -213,6 +232,8 @@ bool TestPlatform::feelsLittle() const noexcept {
 void TestPlatform::choosePhase() noexcept {
   switch (state_.phase) {
     case Phase::kDisarmed:
+      // A wish does not outlive a cause: releasing a button must move nothing.
+      if (forbids(state_.tripped)) wish_ = Request::kNone;
       if (wish_ != Request::kNone && fresh_ticks_ > config_.arming_samples && !state_.tripped.any())
         state_.phase = Phase::kArmed;
       break;
@@ -221,14 +242,7 @@ void TestPlatform::choosePhase() noexcept {
       wish_ = Request::kNone;
       break;
     case Phase::kRunning:
-      if (!segmentIsOver()) break;
-      // A program does not go on without the calibration it asked for.
-      if (state_.segment >= 0 && calibration_.status() != Calibration::Status::kRefused)
-        beginProgram(state_.segment + 1);
-      else if (state_.segment >= 0)
-        beginReturn();
-      else
-        state_.phase = Phase::kArmed;
+      if (segmentIsOver()) endSegment();
       break;
     case Phase::kReturning:
       if (n_ < steps_) break;
@@ -241,6 +255,31 @@ void TestPlatform::choosePhase() noexcept {
     case Phase::kParked:
     case Phase::kStopped: break;
   }
+}
+
+void TestPlatform::endSegment() noexcept {
+  const bool in_program = state_.segment >= 0;
+  if (in_program && segment_.kind == SegmentKind::kCalibration &&
+      calibration_.status() == Calibration::Status::kRefused) {
+    state_.cut_short = true;  // a program does not go on without the calibration it asked for
+    beginReturn();
+  } else if (!state_.motion.x_dot.isZero(0.0) && !nextBrakes()) {
+    segment_ = {};
+    segment_.kind = SegmentKind::kMove;
+    planHold(config_.gentle_braking);
+  } else if (in_program) {
+    beginProgram(state_.segment + 1);
+  } else {
+    state_.phase = Phase::kArmed;
+  }
+}
+
+/// What follows in the program begins by braking.
+bool TestPlatform::nextBrakes() const noexcept {
+  if (state_.segment < 0) return false;
+  const int next = state_.segment + 1;
+  return next >= config_.program.size ||
+         config_.program.segments[static_cast<std::size_t>(next)].kind == SegmentKind::kMove;
 }
 
 bool TestPlatform::segmentIsOver() const noexcept {
@@ -262,6 +301,7 @@ bool TestPlatform::commandsNextState() const noexcept {
 
 void TestPlatform::beginProgram(int at) noexcept {
   state_.segment = at;
+  if (at == 0) state_.cut_short = false;
   if (at >= config_.program.size) {
     beginReturn();
     return;
@@ -269,6 +309,7 @@ void TestPlatform::beginProgram(int at) noexcept {
   const Segment& next = config_.program.segments[static_cast<std::size_t>(at)];
   if (next.kind == SegmentKind::kAdmittance && !feelsLittle()) {
     state_.refusal = Refusal::kLoaded;
+    state_.cut_short = true;
     beginReturn();
     return;
   }
@@ -410,6 +451,10 @@ void TestPlatform::tare(const Sample& sample) noexcept {
       if (state_.age != 0 || !sample.q.allFinite()) return;
       tare_.add(sample.adc, staticCounts(sample));
       if (!tare_.complete()) return;
+      if (!(tare_.mean().cwiseAbs().maxCoeff() <= config_.stillness.bias)) {
+        taring_ = Tare::kNone;  // no stray voltage: a load, or a fault
+        return;
+      }
       bias_path_ = Quintic<6>(atRest(state_.bias), tare_.mean(), config_.tare_ramp);
       tare_n_ = 0;
       taring_ = Tare::kRamping;
@@ -509,6 +554,7 @@ TestPlatform::Step TestPlatform::check(const TickInput& in,
 /// Latches; then brakes, or holds the last checked lengths from now on.
 void TestPlatform::trip(Tripped tripped) noexcept {
   state_.latched = state_.latched | tripped;
+  taring_ = Tare::kNone;  // what it averages may be the fault
   if (state_.phase == Phase::kStopped) return;
   if (state_.phase != Phase::kStopping) {
     state_.cause = tripped.first();
@@ -524,6 +570,7 @@ void TestPlatform::trip(Tripped tripped) noexcept {
 }
 
 void TestPlatform::freeze() noexcept {
+  oscillation_.reset();
   state_.phase = Phase::kStopped;
   state_.motion = atRest(state_.motion.x);
   state_.legs.L_dot.setZero();

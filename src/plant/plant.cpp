@@ -64,7 +64,10 @@ Plant::Plant(const PlantConfig& config)
 }
 
 void Plant::command(const LegCommand& command) noexcept {
-  if (!command.engaged) return;
+  if (!command.engaged) {  // somebody is there, and waits
+    if (heard_ != kNever) heard_ = now_;
+    return;
+  }
   reference_ = command.counts;
   heard_ = now_;
   may_park_ = command.park;
@@ -191,7 +194,7 @@ double Plant::current(std::size_t leg) const noexcept {
 /// The LegSlaves' own watchdog.
 void Plant::watch() noexcept {
   if (heard_ == kNever || now_ - heard_ < config_.watchdog.park_after) return;
-  if (!may_park_ || !loops_closed_) {
+  if (!may_park_) {
     truth_.parking = false;
     return;
   }
@@ -292,7 +295,7 @@ Sample Plant::sample() noexcept {
     const FaultEvent& event = config_.faults[i];
     injectors_[i].apply(event, now(event.cue, event.duration), config_.sensor.volts_per_count, s);
   }
-  loops_closed_ = (s.switches & kAllSwitchesClosed) == kAllSwitchesClosed;
+  if ((s.switches & kAllSwitchesClosed) != kAllSwitchesClosed) may_park_ = false;
   return s;
 }
 

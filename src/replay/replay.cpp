@@ -57,6 +57,7 @@ void forEachField(const state_t& m, F f) {
   f("latched", -1, m.latched);
   f("cause", -1, m.cause);
   f("cause_tick", -1, m.cause_tick);
+  f("cut_short", -1, m.cut_short);
   f("slowed", -1, m.slowed);
   f("late_ticks", -1, m.late_ticks);
   f("engaged", -1, m.engaged);

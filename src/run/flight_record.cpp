@@ -22,11 +22,15 @@ void FlightRecord::keep(const state_t& state, const sample_t& sample) {
     ticks_[next_] = {state, sample};
   next_ = (next_ + 1) % ticks_.capacity();
   constexpr std::int64_t kMoment = 20;  // [-] ticks
-  if (state.phase == static_cast<int>(Phase::kStopped) && state.cause_tick != written_ &&
-      state.header.sequence - state.cause_tick >= kMoment) {
-    written_ = state.cause_tick;
-    write(state.cause_tick);
+  stopped_ = state.phase == static_cast<int>(Phase::kStopped) ? state.cause_tick : -1;
+  if (stopped_ >= 0 && stopped_ != written_ && state.header.sequence - stopped_ >= kMoment) {
+    written_ = stopped_;
+    write(stopped_);
   }
+}
+
+FlightRecord::~FlightRecord() {
+  if (stopped_ >= 0 && stopped_ != written_) write(stopped_);
 }
 
 void FlightRecord::write(std::int64_t tick) const {

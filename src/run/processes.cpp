@@ -10,11 +10,12 @@
 namespace ves {
 namespace {
 
-constexpr int kControllerPriority = 80;           // [-] SCHED_FIFO
-constexpr int kPlantPriority = 70;                // [-] SCHED_FIFO
-constexpr std::int64_t kPlantPeriod = 2'000'000;  // [ns] between the plant's samples, real time
-constexpr int kAnswerTime = 200;                  // [ms] lockstep, before a message is repeated
-constexpr int kAnswerTries = 50;                  // [-] before the other side counts as gone
+constexpr int kControllerPriority = 80;             // [-] SCHED_FIFO
+constexpr int kPlantPriority = 70;                  // [-] SCHED_FIFO
+constexpr std::int64_t kPlantPeriod = 2'000'000;    // [ns] between the plant's samples, real time
+constexpr int kAnswerTime = 200;                    // [ms] lockstep, before a message is repeated
+constexpr std::int64_t kLongestLeap = 100'000'000;  // [-] ticks that a command may pass over
+constexpr int kAnswerTries = 50;                    // [-] before the other side counts as gone
 constexpr std::int64_t kFirstSampleTime = 10'000'000'000;  // [ns]
 
 void conduct(const char* who, int priority, bool required) {
@@ -55,6 +56,14 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
     return ending.reached(state, in.order.request);
   };
 
+  // Before the first tick there is nothing to come home from.
+  const auto wantsOut = [&] { return watch(TickState()).request == Request::kStop; };
+  const auto letGo = [] {
+    RunResult result;
+    result.let_go = true;
+    return result;
+  };
+
   if (options.lockstep) {
     // The machine advances one period for each command and answers with one sample. A lost message
     // is repeated; the answer to a repeated one is the same sample again.
@@ -67,6 +76,7 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
         link.send(out);
         const std::int64_t until = monotonicNow() + kAnswerTime * 1'000'000LL;
         while (link.answers() != in.tick - 1 && monotonicNow() < until) bus.wait(kAnswerTime);
+        if (wantsOut()) return letGo();
       }
       in.sample = link.sample();
       const TickState& state = platform.tick(in);
@@ -91,6 +101,7 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
 
   conduct("controller", kControllerPriority, options.realtime);
   while (link.sample().sequence < 0) {
+    if (wantsOut()) return letGo();
     if (monotonicNow() - start > kFirstSampleTime)
       throw InputError(fmt::format("bus {}: no machine to be heard", options.url));
     bus.wait(100);
@@ -160,7 +171,8 @@ void runPlant(const Experiment& experiment, const ProcessOptions& options,
       }
       if (tick == answered) {
         bus.publish(channel::kSample, last);
-      } else if (tick == -1 || (answered > -2 && tick > answered)) {
+      } else if (tick == -1 ||
+                 (answered > -2 && tick > answered && tick - answered < kLongestLeap)) {
         if (tick >= 0) {
           plant.command(legs);
           plant.advance(start + (tick + 1) * period);

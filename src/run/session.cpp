@@ -55,7 +55,8 @@ void Session::receive(const std::string& channel, const void* data, std::uint32_
   if (on_message_) on_message_(channel, data, size);
   if (channel != channel::kState) return;
   const auto state = decode<state_t>(data, size);
-  if (!state) return;
+  constexpr std::int64_t kLongest = 100'000'000'000;  // [-] ticks
+  if (!state || state->header.sequence < 0 || state->header.sequence > kLongest) return;
   // Ours is the first that began after us.
   if (!state_ && state->header.epoch < self_.epoch) return;
   if (state_ && state->header.source != state_->header.source) return;
@@ -70,8 +71,7 @@ void Session::receive(const std::string& channel, const void* data, std::uint32_
                       ? Tripped(static_cast<std::uint32_t>(state->tripped)).first()
                       : static_cast<Check>(state->cause);
   result_.cause_tick = state->cause_tick;
-  result_.cut_short = state->calibration == static_cast<int>(Calibration::Status::kRefused) ||
-                      state->refusal == static_cast<int>(Refusal::kLoaded);
+  result_.cut_short = state->cut_short != 0;
   if (on_state_) on_state_(*state);
 }
 

@@ -27,6 +27,7 @@ constexpr double kColdest = -273.15, kHottest = 200.0;  // [C]
 constexpr double kMaxTime = 1e6;                        // [s] of an order
 constexpr double kMaxTranslation = 10.0;                // [m]
 constexpr double kMaxRotation = 10.0;                   // [rad]
+constexpr std::int64_t kMaxSequence = 100'000'000'000;  // [-] 30 years of 100 Hz
 constexpr double kMaxFrequency = 1e3;                   // [Hz]
 
 }  // namespace
@@ -110,6 +111,7 @@ state_t toMessage(const TickState& state, const TickInput& in, const header_t& h
   m.latched = static_cast<std::int32_t>(state.latched.bits());
   m.cause = static_cast<std::int32_t>(state.cause);
   m.cause_tick = state.cause_tick;
+  m.cut_short = state.cut_short ? 1 : 0;
   m.slowed = state.slowed;
   m.late_ticks = state.late_ticks;
   m.engaged = state.command.engaged ? 1 : 0;
@@ -193,7 +195,7 @@ std::optional<Sample> fromMessage(const sample_t& m) noexcept {
   Sample s;
   s.sequence = m.header.sequence;
   s.time = m.header.time_ns;
-  bool good = s.sequence >= 0;
+  bool good = inRange<std::int64_t>(s.sequence, 0, kMaxSequence);
   for (std::size_t i = 0; i < s.adc.size(); ++i) {
     s.adc[i] = m.adc[i];
     good = good && inRange(m.adc[i], -32768, 32767);
@@ -218,7 +220,8 @@ std::optional<LegCommand> fromMessage(const leg_command_t& m) noexcept {
   c.engaged = m.engaged != 0;
   c.segment = m.segment;
   c.park = m.park != 0;
-  bool good = inRange(m.segment, -1, kMaxSegments) && inRange<int>(m.engaged, 0, 1) &&
+  bool good = inRange<std::int64_t>(m.header.sequence, -1, kMaxSequence) &&
+              inRange(m.segment, -1, kMaxSegments) && inRange<int>(m.engaged, 0, 1) &&
               inRange<int>(m.park, 0, 1);
   for (std::size_t i = 0; i < c.counts.size(); ++i) {
     c.counts[i] = m.counts[i];

@@ -38,7 +38,7 @@ void behindFingerprint(const std::uint8_t* data, std::size_t size) {
   const std::int64_t hash = Message::getHash();
   for (int i = 0; i < 8; ++i) bytes[i] = static_cast<std::uint8_t>(hash >> (56 - 8 * i));
   const auto want = static_cast<std::size_t>(Message().getEncodedSize());
-  std::memcpy(bytes + 8, data, size < want - 8 ? size : want - 8);
+  if (size > 0) std::memcpy(bytes + 8, data, size < want - 8 ? size : want - 8);
   message(bytes, static_cast<std::int64_t>(want));
 }
 

@@ -104,6 +104,7 @@ struct TickState {
   double unrest_amount = 0.0;                                    // [count | rad | m]
   Vec6 deviation = Vec6::Zero();                                 // [count] of a channel's samples
   Vec6 standard_error = Vec6::Zero();                            // [count] of the bias
+  bool cut_short = false;        // the program: a calibration or a start was refused
   double slowed = 1.0;           // [-] share of the admittance model's step that was taken
   std::int64_t late_ticks = 0;   // [-] so far
   Tripped tripped;               // in this tick
@@ -141,6 +142,8 @@ class TestPlatform {
   void planHold(const ControllerConfig::Braking& braking) noexcept;
   void freeze() noexcept;
   bool segmentIsOver() const noexcept;
+  void endSegment() noexcept;
+  bool nextBrakes() const noexcept;
   bool commandsNextState() const noexcept;
   void calibrate(const Sample& sample) noexcept;
   void tare(const Sample& sample) noexcept;

@@ -44,9 +44,9 @@ struct RobotEvent {
   RobotMove move;
 };
 
-/// What the LegSlaves do when commands stop coming: they keep their last reference, and after a
-/// while go slowly home, unless the last command told them to stay or a safety loop is open. Each
-/// by itself: every board knows its own length at home, and all take the same time.
+/// What the LegSlaves do when nobody commands them: they keep their last reference, and after a
+/// while go slowly home, unless the last command told them to stay or a safety loop has been opened
+/// since. Each by itself: every board knows its own length at home, and all take the same time.
 struct Watchdog {
   std::int64_t park_after = 10'000'000'000;  // [ns] of silence
   std::int64_t park_time = 20'000'000'000;   // [ns]
@@ -159,7 +159,6 @@ class Plant {
   std::int64_t next_robot_event_ = kNever;              // [ns]
   std::int64_t heard_ = kNever;  // [ns] the last command to follow; kNever: none yet
   bool may_park_ = false;
-  bool loops_closed_ = true;  // in the last sample
   LegCounts home_{}, parked_from_{};
   std::vector<Injector> injectors_;  // one a fault
   std::vector<bool> robot_event_done_;

@@ -21,8 +21,7 @@ class Ending {
     ++result_.ticks;
     last_tick_ = state.tick;
     result_.phase = state.phase;
-    result_.cut_short =
-        state.calibration == Calibration::Status::kRefused || state.refusal == Refusal::kLoaded;
+    result_.cut_short = state.cut_short;
     const bool stop = request == Request::kStop;
     if (request == Request::kHold) attended_ = true;
     switch (state.phase) {

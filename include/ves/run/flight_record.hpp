@@ -16,6 +16,10 @@ class FlightRecord {
 
   /// `folder` is where records go; empty: none are written.
   FlightRecord(const Experiment& experiment, std::filesystem::path folder);
+  /// Writes what a stop has left unwritten.
+  ~FlightRecord();
+  FlightRecord(const FlightRecord&) = delete;
+  FlightRecord& operator=(const FlightRecord&) = delete;
 
   /// Keeps a tick. Writes the record once the platform has stood for a moment after a trip.
   void keep(const state_t& state, const sample_t& sample);
@@ -32,6 +36,7 @@ class FlightRecord {
   std::vector<Tick> ticks_;  // a ring
   std::size_t next_ = 0;
   std::int64_t written_ = -1;  // [-] cause_tick of the last record
+  std::int64_t stopped_ = -1;  // [-] cause_tick of the stop that lasts
 };
 
 }  // namespace ves
