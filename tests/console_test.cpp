@@ -168,6 +168,16 @@ TEST_F(Console, AScriptCalibratesMovesCollectsAndParks) {
   EXPECT_EQ(next.status, 0) << next.text;
 }
 
+TEST_F(Console, AScriptRunsTheScenariosProgramToItsEnd) {
+  const Output o = sh("cd " + folder_.string() + "; " + app("controller") +
+                      "z_sine --plant --private-bus --no-plots " + patient() + " --set '" +
+                      kShortProgram + "' --do program --do 'move x 5' --out a");
+  EXPECT_EQ(o.status, 0) << o.text;
+  EXPECT_NE(o.text.find("running: trajectory (2 of 2)"), std::string::npos) << o.text;
+  EXPECT_NE(o.text.find("holding  x +5.0"), std::string::npos) << o.text;
+  EXPECT_EQ(summary(folder_ / "a")["ended"], "parked");
+}
+
 TEST_F(Console, AScriptStopsAtWhatIsRefused) {
   const Output o = sh(session("--do 'admittance 1' --do 'move x 10' --out a"));
   EXPECT_EQ(o.status, 1) << o.text;

@@ -96,6 +96,7 @@ class Console {
     session.onMessage([this](const std::string& channel, const void* data, std::uint32_t size) {
       collect(channel, data, size);
     });
+    while (!session.state() && !over()) session.listen(kTurn);
     if (options_.commands.empty())
       ask();
     else
@@ -384,7 +385,6 @@ class Console {
   }
 
   void ask() {
-    while (!session_->state() && !over()) session_->listen(kTurn);
     if (terminal_) help();
     while (!over()) {
       auto text = line("> ");
@@ -426,7 +426,25 @@ class Console {
     return true;
   }
 
+  /// A program is run under attendance: it ends holding at home, and the menu goes on.
+  bool armFirst() {
+    Order arm;
+    arm.request = Request::kArm;
+    const auto refusal = session_->order(arm);
+    if (refusal && *refusal != Refusal::kNone)
+      say(fmt::format("not taken: {}{}", name(*refusal), advice(*refusal)));
+    const std::int64_t patience = monotonicNow() + kPatience;
+    while (refusal == Refusal::kNone && phase_ == Phase::kDisarmed && !over() &&
+           monotonicNow() < patience)
+      session_->listen(kTurn);
+    if (phase_ == Phase::kArmed) return true;
+    say("not armed");
+    failed_ = failed_ || !script_.empty();
+    return false;
+  }
+
   bool give(const Command& command) {
+    if (command.verb == Verb::kProgram && phase_ == Phase::kDisarmed && !armFirst()) return true;
     const auto refusal = session_->order(command.order);
     if (!refusal) {
       say("the controller does not answer");
@@ -454,7 +472,7 @@ class Console {
   void obeyScript() {
     for (std::size_t i = 0; i < script_.size() && !over() && !failed_; ++i) {
       say("> " + options_.commands[i]);
-      const bool arms = script_[i].verb == Verb::kArm || script_[i].verb == Verb::kProgram;
+      const bool arms = script_[i].verb == Verb::kArm;
       if (!obey(script_[i])) return;
       const auto settled = [&] {
         const auto& s = session_->state();
