@@ -43,6 +43,12 @@ inline void catchSignals() {
   sigaction(SIGTERM, &action, nullptr);
 }
 
+/// Where bases, robots and scenarios are.
+inline std::filesystem::path configFolder() {
+  const char* given = std::getenv("VES_CONFIG_DIR");
+  return given ? given : "config";
+}
+
 /// Which experiment, and on which bus.
 struct Options {
   std::string scenario;
@@ -67,10 +73,9 @@ struct Options {
   }
 
   Experiment load() const {
-    const char* config = std::getenv("VES_CONFIG_DIR");
     std::vector<std::string> all = overrides;
     if (seed >= 0) all.push_back(fmt::format("seed={}", seed));
-    return loadExperiment(findScenario(scenario, config ? config : "config"), all, calibration);
+    return loadExperiment(findScenario(scenario, configFolder()), all, calibration);
   }
 };
 

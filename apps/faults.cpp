@@ -69,8 +69,7 @@ int main(int argc, char** argv) {
   cli.add_option("--kill", times, "instead: kill a controller at so many random moments")
       ->check(CLI::Range(1, 100'000));
   return app::run(cli, argc, argv, [&] {
-    const char* given = std::getenv("VES_CONFIG_DIR");
-    const std::filesystem::path config = given ? given : "config";
+    const std::filesystem::path config = app::configFolder();
     const auto programs = std::filesystem::read_symlink("/proc/self/exe").parent_path();
     app::catchSignals();
     if (ticks > 0) {

@@ -22,8 +22,7 @@ int main(int argc, char** argv) {
   return app::run(cli, argc, argv, [&] {
     std::optional<Experiment> other;
     if (!with.empty()) {
-      const char* config = std::getenv("VES_CONFIG_DIR");
-      other = loadExperiment(findScenario(with, config ? config : "config"));
+      other = loadExperiment(findScenario(with, app::configFolder()));
       options.with = &*other;
     }
     Phase phase = Phase::kDisarmed;

@@ -167,12 +167,7 @@ class Console {
   }
 
   static std::string failing(std::int32_t bits) {
-    std::string out;
-    const Tripped tripped(static_cast<std::uint32_t>(bits));
-    for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(Check::kCount); ++i)
-      if (tripped.has(static_cast<Check>(i)))
-        out += fmt::format("{}{}", out.empty() ? "" : ", ", name(static_cast<Check>(i)));
-    return out;
+    return names(Tripped(static_cast<std::uint32_t>(bits)));
   }
 
   std::string evidence(const state_t& s) const {

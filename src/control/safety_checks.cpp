@@ -46,9 +46,9 @@ bool freezes(Check check) noexcept {
 }
 
 bool Tripped::freeze() const noexcept {
-  for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(Check::kCount); ++i)
-    if (has(static_cast<Check>(i)) && freezes(static_cast<Check>(i))) return true;
-  return false;
+  bool any = false;
+  forEach([&](Check check) { any = any || freezes(check); });
+  return any;
 }
 
 Check Tripped::first() const noexcept {

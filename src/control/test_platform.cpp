@@ -125,11 +125,12 @@ void TestPlatform::measureWrench(const Sample& sample) noexcept {
   // The measured attitude: the commanded one leads it by the servo's lag, and the difference would
   // pass as a wrench of the robot's weight.
   const Mat3& R_IP = X_IP_measured_.R;
+  load_ = S_proc_ * staticWrench(config_.payload, sample.q, R_IP, config_.gravity).stacked();
   tare(sample);
   state_.total = forceMeasurement(config_.sensor, state_.bias, sample.adc, R_IP);
   state_.fixed = gravityCompensation(config_.payload, sample.q, R_IP, config_.gravity);
   state_.dynamic = state_.total - state_.fixed;
-  if (state_.age == 0) frozen_.take(sample.adc, staticCounts(sample));
+  if (state_.age == 0) frozen_.take(sample.adc, load_);
 }
 
 Refusal TestPlatform::obey(const Order& order) noexcept {
@@ -182,7 +183,6 @@ Refusal TestPlatform::obey(const Order& order) noexcept {
       state_.cause_tick = -1;
       fresh_ticks_ = 0;
       wish_ = Request::kNone;
-      oscillation_.reset();
       return Refusal::kNone;
   }
   return Refusal::kNone;
@@ -199,21 +199,14 @@ Refusal TestPlatform::accept(const Segment& segment) noexcept {
   const std::int64_t stride = std::max<std::int64_t>(1, steps_ / kLooks);
   Vec6 L_last = state_.legs.L;
   for (std::int64_t n = 0; n <= steps_; n += stride) {
-    const PathPoint<6> at =
-        segment.kind == SegmentKind::kMove
-            ? moveAt(n)
-            : trajectoryGeneration(segment_.trajectory, segment_start_, n, steps_, period_);
+    const PathPoint<6> at = pathAt(n);
     const BodyMotion P = bodyMotion(config_.geometry, Pose::from(at.x), at.x_dot, at.x_ddot);
     const LegMotion legs = legMotion(config_.geometry, P);
-    Tripped t = pathChecks(P.X, Pose::from(at.x), legs.L);
     // From one look to the next, and at the look itself.
     const double since = static_cast<double>(n == 0 ? 1 : stride) * period_;
-    const auto moves = [&](const Vec6& to, const Vec6& from, double time) {
-      t.require(Check::kVelocity, velocityCheck(config_.safety, to, from, time));
-      t.require(Check::kFlow, flowLimitsCheck(config_.safety, to, from, time));
-    };
-    moves(legs.L, L_last, since);
-    moves(legs.L + period_ * legs.L_dot, legs.L, period_);
+    const Tripped t = pathChecks(P.X, Pose::from(at.x), legs.L) |
+                      stepChecks(legs.L, L_last, since) |
+                      stepChecks(legs.L + period_ * legs.L_dot, legs.L, period_);
     L_last = legs.L;
     if (!t.any()) continue;
     state_ = before;
@@ -264,9 +257,7 @@ void TestPlatform::endSegment() noexcept {
     state_.cut_short = true;  // a program does not go on without the calibration it asked for
     beginReturn();
   } else if (!state_.motion.x_dot.isZero(0.0) && !nextBrakes()) {
-    segment_ = {};
-    segment_.kind = SegmentKind::kMove;
-    planHold(config_.gentle_braking);
+    brakeHere();
   } else if (in_program) {
     beginProgram(state_.segment + 1);
   } else {
@@ -368,6 +359,11 @@ void TestPlatform::beginMove(const Vec6& target, double duration) noexcept {
 void TestPlatform::hold() noexcept {
   state_.phase = Phase::kRunning;
   state_.segment = -1;
+  brakeHere();
+}
+
+/// As a move that ends where the braking does.
+void TestPlatform::brakeHere() noexcept {
   segment_ = {};
   segment_.kind = SegmentKind::kMove;
   planHold(config_.gentle_braking);
@@ -383,6 +379,13 @@ void TestPlatform::planHold(const ControllerConfig::Braking& braking) noexcept {
 PathPoint<6> TestPlatform::moveAt(std::int64_t n) const noexcept {
   const double t = static_cast<double>(n) * period_;
   return t < brake_.duration() ? brake_.at(t) : move_.at(t - brake_.duration());
+}
+
+/// Of a move or a trajectory, n periods after it began.
+PathPoint<6> TestPlatform::pathAt(std::int64_t n) const noexcept {
+  return segment_.kind == SegmentKind::kMove
+             ? moveAt(n)
+             : trajectoryGeneration(segment_.trajectory, segment_start_, n, steps_, period_);
 }
 
 double TestPlatform::gentleDuration(const Vec6& from, const Vec6& to) const noexcept {
@@ -405,9 +408,8 @@ PathPoint<6> TestPlatform::nextMotion(const Sample& sample) noexcept {
   const std::int64_t n = ++n_;
   switch (segment_.kind) {
     case SegmentKind::kCalibration: calibrate(sample); break;
-    case SegmentKind::kMove: return moveAt(n);
-    case SegmentKind::kTrajectory:
-      return trajectoryGeneration(segment_.trajectory, segment_start_, n, steps_, period_);
+    case SegmentKind::kMove:
+    case SegmentKind::kTrajectory: return pathAt(n);
     case SegmentKind::kAdmittance:
       // A wrench that is no number must not enter the model's state; the finite check stops the
       // run.
@@ -424,14 +426,8 @@ PathPoint<6> TestPlatform::nextMotion(const Sample& sample) noexcept {
   return atRest(state_.motion.x);
 }
 
-/// What the static load alone would read.
-Vec6 TestPlatform::staticCounts(const Sample& sample) const noexcept {
-  return S_proc_ *
-         staticWrench(config_.payload, sample.q, X_IP_measured_.R, config_.gravity).stacked();
-}
-
 void TestPlatform::calibrate(const Sample& sample) noexcept {
-  if (state_.age == 0) calibration_.add(sample, staticCounts(sample));
+  if (state_.age == 0) calibration_.add(sample, load_);
   state_.calibration = calibration_.status();
   state_.unrest = calibration_.unrest();
   state_.unrest_index = calibration_.unrestIndex();
@@ -449,7 +445,7 @@ void TestPlatform::tare(const Sample& sample) noexcept {
     case Tare::kNone: return;
     case Tare::kAveraging:
       if (state_.age != 0 || !sample.q.allFinite()) return;
-      tare_.add(sample.adc, staticCounts(sample));
+      tare_.add(sample.adc, load_);
       if (!tare_.complete()) return;
       if (!(tare_.mean().cwiseAbs().maxCoeff() <= config_.stillness.bias)) {
         taring_ = Tare::kNone;  // no stray voltage: a load, or a fault
@@ -490,8 +486,7 @@ void TestPlatform::envelope() noexcept {
     const Transform X_rest = config_.geometry.fromHome(rest);
     const Vec6 L = legLengths(config_.geometry, config_.geometry.fromHome(next));
     return !pathChecks(X_rest, rest, legLengths(config_.geometry, X_rest)).any() &&
-           velocityCheck(config_.safety, L, state_.legs.L, period_) &&
-           flowLimitsCheck(config_.safety, L, state_.legs.L, period_);
+           !stepChecks(L, state_.legs.L, period_).any();
   };
   state_.slowed = 1.0;
   if (fits(1.0)) return;
@@ -518,6 +513,14 @@ Tripped TestPlatform::pathChecks(const Transform& X_IP, const Pose& x,
   return t;
 }
 
+/// The checks of going from one set of lengths to another in `time` [s].
+Tripped TestPlatform::stepChecks(const Vec6& L, const Vec6& L_last, double time) const noexcept {
+  Tripped t;
+  t.require(Check::kVelocity, velocityCheck(config_.safety, L, L_last, time));
+  t.require(Check::kFlow, flowLimitsCheck(config_.safety, L, L_last, time));
+  return t;
+}
+
 /// Inverse kinematics and all safety checks of what would be commanded.
 TestPlatform::Step TestPlatform::check(const TickInput& in,
                                        const PathPoint<6>& next) const noexcept {
@@ -529,7 +532,7 @@ TestPlatform::Step TestPlatform::check(const TickInput& in,
   const Vec6& L_last = following ? state_.legs.L : legs.L;
   const Vec6& L_in_force = following ? state_.legs.L : state_.L_measured;
 
-  Tripped t = pathChecks(P.X, Pose::from(next.x), legs.L);
+  Tripped t = pathChecks(P.X, Pose::from(next.x), legs.L) | stepChecks(legs.L, L_last, period_);
   t.require(Check::kPanicButton, in.sample.switches & kPanicButtonClosed);
   t.require(Check::kFloorMat, in.sample.switches & kFloorMatClosed);
   t.require(Check::kFinite, next.x.allFinite() && next.x_dot.allFinite() &&
@@ -545,8 +548,6 @@ TestPlatform::Step TestPlatform::check(const TickInput& in,
   t.require(Check::kSensorSaturated, saturationCheck(in.sample.adc));
   t.require(Check::kSensorFrozen, frozen_.good(limits));
   t.require(Check::kOscillation, oscillation_.good(limits));
-  t.require(Check::kVelocity, velocityCheck(limits, legs.L, L_last, period_));
-  t.require(Check::kFlow, flowLimitsCheck(limits, legs.L, L_last, period_));
   t.require(Check::kRival, !in.rival);
   return {next, legs, t};
 }

@@ -43,14 +43,6 @@ std::string program(const std::string& segment, const std::string& fault) {
          fault + "}]}]";
 }
 
-std::string names(Tripped tripped) {
-  std::string out;
-  for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(Check::kCount); ++i)
-    if (tripped.has(static_cast<Check>(i)))
-      out += fmt::format("{}{}", out.empty() ? "" : ", ", name(static_cast<Check>(i)));
-  return out.empty() ? "nothing" : out;
-}
-
 /// What a lockstep run should come to.
 struct Expect {
   Phase phase = Phase::kParked;
@@ -74,11 +66,10 @@ class Lockstep {
     const double period = static_cast<double>(e.controller.period) * kSecondPerNanosecond;
     Seen seen;
     seen.period = period;
-    std::int64_t injected = -1, detected = -1, n = 0;
+    std::int64_t injected = -1, detected = -1;
     Phase worst = Phase::kDisarmed;
     Tripped latched;
     const RunResult result = runLockstep(e, nullptr, [&](const TickState& s) {
-      ++n;
       if (injected < 0 && s.segment == kSegment && s.phase == Phase::kRunning)
         injected = s.tick + static_cast<std::int64_t>(kInjection / period);
       if (detected < 0 && s.latched.any()) detected = s.tick;
@@ -345,11 +336,10 @@ std::vector<FaultRow> faultTable(const fs::path& config, const fs::path& program
     return verdict(r.cut_short && r.phase == Phase::kParked, "calibration refused, parked at home");
   });
   row("F7", "samples two calls late, then shuffled", "the run goes on", [puma] {
-    Seen a = puma.run({program(kEmulate,
-                               "duration_s: 1, fault: samples_late, samples: 2}, {at_s: "
-                               "4, duration_s: 1, fault: samples_shuffled")},
-                      Expect{});
-    return a;
+    return puma.run({program(kEmulate,
+                             "duration_s: 1, fault: samples_late, samples: 2}, {at_s: "
+                             "4, duration_s: 1, fault: samples_shuffled")},
+                    Expect{});
   });
   row("F8", "samples stop", "controlled stop: sample age",
       inject(kEmulate, "duration_s: 60, fault: samples_lost", stops(Check::kStale, 5)));

@@ -188,8 +188,7 @@ nlohmann::ordered_json summarise(const Series& series, const RunResult& result) 
   out["trips"] = nlohmann::ordered_json::array();
   if (!series.rows.empty()) {
     const Tripped latched(static_cast<std::uint32_t>(series.rows.back().state.latched));
-    for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(Check::kCount); ++i)
-      if (latched.has(static_cast<Check>(i))) out["trips"].push_back(name(static_cast<Check>(i)));
+    latched.forEach([&](Check check) { out["trips"].push_back(name(check)); });
   }
   out["first_cause"] = name(result.cause);
   out["first_cause_tick"] = result.cause_tick;

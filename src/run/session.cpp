@@ -55,8 +55,7 @@ void Session::receive(const std::string& channel, const void* data, std::uint32_
   if (on_message_) on_message_(channel, data, size);
   if (channel != channel::kState) return;
   const auto state = decode<state_t>(data, size);
-  constexpr std::int64_t kLongest = 100'000'000'000;  // [-] ticks
-  if (!state || state->header.sequence < 0 || state->header.sequence > kLongest) return;
+  if (!state || state->header.sequence < 0 || state->header.sequence > kMaxSequence) return;
   // Ours is the first that began after us.
   if (!state_ && state->header.epoch < self_.epoch) return;
   if (state_ && state->header.source != state_->header.source) return;

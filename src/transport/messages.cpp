@@ -27,7 +27,6 @@ constexpr double kColdest = -273.15, kHottest = 200.0;  // [C]
 constexpr double kMaxTime = 1e6;                        // [s] of an order
 constexpr double kMaxTranslation = 10.0;                // [m]
 constexpr double kMaxRotation = 10.0;                   // [rad]
-constexpr std::int64_t kMaxSequence = 100'000'000'000;  // [-] 30 years of 100 Hz
 constexpr double kMaxFrequency = 1e3;                   // [Hz]
 
 }  // namespace
@@ -189,6 +188,15 @@ std::optional<experiment_t> decode<experiment_t>(const void* data, std::int64_t 
   experiment_t message;
   if (at != size || message.decode(data, 0, static_cast<int>(size)) != size) return {};
   return message;
+}
+
+std::string names(Tripped tripped) {
+  std::string out;
+  tripped.forEach([&](Check check) {
+    if (!out.empty()) out += ", ";
+    out += name(check);
+  });
+  return out;
 }
 
 std::optional<Sample> fromMessage(const sample_t& m) noexcept {

@@ -56,6 +56,12 @@ class Tripped {
   bool has(Check check) const noexcept { return (bits_ & bit(check)) != 0; }
   bool any() const noexcept { return bits_ != 0; }
   std::uint32_t bits() const noexcept { return bits_; }
+  /// Calls f(check) for each, by priority.
+  template <typename F>
+  void forEach(F f) const {
+    for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(Check::kCount); ++i)
+      if (has(static_cast<Check>(i))) f(static_cast<Check>(i));
+  }
   /// One of them freezes.
   bool freeze() const noexcept;
   /// The tripped check of highest priority; kCount when none.

@@ -139,6 +139,7 @@ class TestPlatform {
   void beginMove(const Vec6& target, double duration) noexcept;
   Vec6 brake(const ControllerConfig::Braking& braking) noexcept;
   void hold() noexcept;
+  void brakeHere() noexcept;
   void planHold(const ControllerConfig::Braking& braking) noexcept;
   void freeze() noexcept;
   bool segmentIsOver() const noexcept;
@@ -147,10 +148,11 @@ class TestPlatform {
   bool commandsNextState() const noexcept;
   void calibrate(const Sample& sample) noexcept;
   void tare(const Sample& sample) noexcept;
-  Vec6 staticCounts(const Sample& sample) const noexcept;
   std::int64_t idleTicks() const noexcept;
   PathPoint<6> nextMotion(const Sample& sample) noexcept;
   void envelope() noexcept;
+  PathPoint<6> pathAt(std::int64_t n) const noexcept;
+  Tripped stepChecks(const Vec6& L, const Vec6& L_last, double time) const noexcept;
   Tripped pathChecks(const Transform& X_IP, const Pose& x, const Vec6& L) const noexcept;
 
   /// A command in the making.
@@ -180,7 +182,8 @@ class TestPlatform {
   Quintic<6> bias_path_;     // [count] of a tare
   std::int64_t tare_n_ = 0;  // [-] ticks since it began
   TickState state_;
-  Sample sample_;  // the last
+  Sample sample_;             // the last
+  Vec6 load_ = Vec6::Zero();  // [count] what the static load alone would read
   Transform X_IP_measured_;
   bool legs_solved_ = false;       // forward kinematics found the pose of this sample
   int fresh_ticks_ = 0;            // [-] consecutive ticks with a new sample and no rival

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <ves/experiment_t.hpp>
 #include <ves/leg_command_t.hpp>
 #include <ves/operator_t.hpp>
@@ -38,6 +39,11 @@ truth_t toMessage(const plant::Truth& truth, const header_t& header) noexcept;
 operator_t toMessage(const Order& order, std::int64_t controller, const header_t& header) noexcept;
 
 robot_command_t toMessage(const plant::RobotMove& move, const header_t& header) noexcept;
+
+/// "panic button, floor mat"; empty when none tripped.
+std::string names(Tripped tripped);
+
+inline constexpr std::int64_t kMaxSequence = 100'000'000'000;  // [-] 30 years of 100 Hz
 
 /// Nothing when a value is out of range or not a number.
 std::optional<Sample> fromMessage(const sample_t& message) noexcept;
