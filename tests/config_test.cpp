@@ -61,6 +61,11 @@ TEST(Config, EveryMachineNumberIsTheReportsOrTagged) {
                                         "swing_c",
                                         "period_h",
                                         "rising_h",
+                                        "name",
+                                        "axis",
+                                        "elements",
+                                        "damping_ratio",
+                                        "platform_rpy_deg",
                                         "translation_m",
                                         "rotation_deg",
                                         "mass_diagonal",
@@ -75,7 +80,8 @@ TEST(Config, EveryMachineNumberIsTheReportsOrTagged) {
         for (std::size_t i = 0; i < value.children.size(); ++i)
           check(value.children[i], value.kind == Value::Kind::kMap ? value.keys[i] : key, tagged);
       };
-  check(loadDocument(fs::path(test::configDir()) / "ves.yaml"), "", false);
+  for (const char* file : {"ves.yaml", "arms/srms.yaml"})
+    check(loadDocument(fs::path(test::configDir()) / file), "", false);
 }
 
 TEST(Config, AnotherBaseReplacesTheMachinesOwn) {
@@ -83,7 +89,8 @@ TEST(Config, AnotherBaseReplacesTheMachinesOwn) {
     return loadExperiment(scenarios() / "free_decay.yaml", {"base=" + value}).controller.admittance;
   };
   const ModalModel modes = base(
-      "{modes: {frequency_hz: [0.5, 1], damping_ratio: [0.02, 0.02], shapes: [[1, 0], [0, 1], [0, "
+      "{modes: {frequency_hz: [0.5, 1], damping_ratio: [0.02, 0.02], generalized_mass: [1, 1], "
+      "shapes: [[1, 0], [0, 1], [0, "
       "0], "
       "[0, 0], [0, 0], [0, 0]]}}");
   EXPECT_EQ(modes.Phi.cols(), 2);
@@ -122,6 +129,29 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(
         Bad{"unknown_key", "z_sine", "legs.tau_ms=6.4", "legs.tau_ms: unknown key"},
         Bad{"hint", "z_sine", "legs.filter=none", "legs.filter: unknown key"},
+        Bad{"modes_not_normalised", "z_sine",
+            "base={modes: {frequency_hz: [1], damping_ratio: [0], generalized_mass: [2.5], shapes: "
+            "[[1], [0], [0], [0], [0], [0]]}}",
+            "base.modes.generalized_mass: mode 1 has 2.5, want 1"},
+        Bad{"modes_of_another_shape", "z_sine",
+            "base={modes: {frequency_hz: [1, 2], damping_ratio: [0, 0], generalized_mass: [1, 1], "
+            "shapes: [[1, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0, 0]]}}",
+            "base.modes.shapes"},
+        Bad{"pose_beyond_joint", "srms_unberth_puma", "base.arm.pose_deg.elbow_pitch=10",
+            "base.arm.pose_deg.elbow_pitch: '10', want a number in [-161, 2.4]"},
+        Bad{"no_such_joint", "srms_unberth_puma", "base.arm.pose_deg.knee=10",
+            "base.arm.pose_deg.knee: unknown key"},
+        Bad{"payload_without_inertia", "srms_unberth_puma", "base.arm.payload={mass_kg: 50}",
+            "base.arm.payload.inertia_kg_m2"},
+        Bad{"payload_that_cannot_be", "srms_unberth_puma",
+            "base.arm.payload={mass_kg: 50, inertia_kg_m2: [1, 1, -1, 0, 0, 0]}",
+            "base.arm.payload.inertia_kg_m2: smallest principal moment -1"},
+        Bad{"too_many_modes", "srms_unberth_puma", "base.keep_modes=133",
+            "base.keep_modes: '133', want a whole number in [1, 132]"},
+        Bad{"massless_part", "srms_unberth_puma",
+            "base={arm: {damping_ratio: 0, stiffness_scale: 1, pose_deg: {}, chain: [{beam: {to_m: "
+            "[1, 0, 0], EI_n_m2: 1, GJ_n_m2: 1, EA_n: 1, mass_kg: 0, radius_m: 0, elements: 1}}]}}",
+            "base.arm.chain: a part that can move has no mass"},
         Bad{"nan", "z_sine", "legs.tau_s=nan", "legs.tau_s: 'nan', want a number in [1e-06, 1]"},
         Bad{"infinite", "z_sine", "platform.home_height_m=inf", "platform.home_height_m: 'inf'"},
         Bad{"with_unit", "z_sine", "legs.tau_s=6.4 ms", "legs.tau_s: '6.4 ms', want a number"},

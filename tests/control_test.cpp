@@ -10,8 +10,8 @@
 #include "support/poses.hpp"
 #include "support/robots.hpp"
 #include "ves/config/experiment.hpp"
-#include "ves/config/modes.hpp"
 #include "ves/robot/newton_euler.hpp"
+#include "ves/srms/modes.hpp"
 
 namespace ves {
 namespace {

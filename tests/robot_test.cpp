@@ -4,6 +4,7 @@
 #include <kdl/chainidsolver_recursive_newton_euler.hpp>
 #include <random>
 
+#include "support/momentum.hpp"
 #include "support/poses.hpp"
 #include "support/robots.hpp"
 #include "ves/robot/newton_euler.hpp"
@@ -40,31 +41,6 @@ RobotModel skewRobot() {
   return robot;
 }
 
-/// Momentum of the robot about the origin of I, from poses alone.
-Vec6 momentum(const RobotModel& robot, const test::Swing& base, const Transform& X_PL0, double t) {
-  const auto poseOf = [&](int body, double s) {
-    Transform X = base.motion(s).X * X_PL0;
-    const JointState q = jointSwing(robot.joints, s);
-    for (int i = 0; i < body; ++i) X = X * linkPose(robot.link(i), q.q(i));
-    return X;
-  };
-  const double h = 1e-3;  // five-point stencil: error h^4
-  Vec6 sum = Vec6::Zero();
-  for (int body = 0; body <= robot.joints; ++body) {
-    const RigidBody& b = body == 0 ? robot.base : robot.link(body - 1).body;
-    const auto com = [&](double s) { return Vec3(poseOf(body, s) * b.p_BoBcm_B); };
-    const auto R = [&](double s) { return poseOf(body, s).R; };
-    const Vec3 v = (com(t - 2 * h) - 8 * com(t - h) + 8 * com(t + h) - com(t + 2 * h)) / (12 * h);
-    const Mat3 W =
-        (R(t - 2 * h) - 8 * R(t - h) + 8 * R(t + h) - R(t + 2 * h)) / (12 * h) * R(t).transpose();
-    const Vec3 w(0.5 * (W(2, 1) - W(1, 2)), 0.5 * (W(0, 2) - W(2, 0)), 0.5 * (W(1, 0) - W(0, 1)));
-    const Mat3 I_I = R(t) * b.I_Bcm_B * R(t).transpose();
-    sum.head<3>() += b.mass * v;
-    sum.tail<3>() += I_I * w + com(t).cross(b.mass * v);
-  }
-  return sum;
-}
-
 double totalMass(const RobotModel& robot) {
   double mass = robot.base.mass;
   for (int i = 0; i < robot.joints; ++i) mass += robot.link(i).body.mass;
@@ -81,7 +57,11 @@ TEST_P(MovingBase, WrenchIsTheRateOfMomentum) {  // Appendix A with link 0 and a
   for (unsigned seed = 1; seed <= 5; ++seed) {
     const test::Swing base(seed);
     for (double t = 0.3; t < 2.0; t += 0.4) {
-      const auto p = [&](double s) { return momentum(robot, base, X_PL0, s); };
+      const auto p = [&](double s) {
+        return test::momentum(
+            robot, [&](double at) { return base.motion(at).X * X_PL0; },
+            [&](double at) { return jointSwing(robot.joints, at).q; }, s, h);
+      };
       const Vec6 rate = (p(t - 2 * h) - 8 * p(t - h) + 8 * p(t + h) - p(t + 2 * h)) / (12 * h);
 
       const BodyMotion P = base.motion(t);

@@ -423,4 +423,19 @@ void Section::failAt(const Value& at, const std::string& path, const std::string
                                path.empty() ? "" : ": ", what));
 }
 
+std::filesystem::path findFile(const std::string& kind, const std::string& name,
+                               const std::filesystem::path& folder) {
+  const std::filesystem::path given(name);
+  if (given.extension() == ".yaml") return given;
+  const std::filesystem::path named = folder / (name + ".yaml");
+  std::error_code error;
+  if (!name.empty() && std::filesystem::exists(named, error)) return named;
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error))
+    if (entry.path().extension() == ".yaml") names.push_back(entry.path().stem().string());
+  std::sort(names.begin(), names.end());
+  throw InputError(fmt::format("{} '{}': unknown, want one of {} or a path to a .yaml file", kind,
+                               name, fmt::join(names, ", ")));
+}
+
 }  // namespace ves

@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "ves/config/modes.hpp"
+#include "ves/config/base.hpp"
 #include "ves/config/urdf.hpp"
 
 namespace ves {
@@ -177,44 +177,6 @@ SafetyLimits readSafety(Section s, double volts_per_count) {
   l.start_moment = s.number("start_moment_nm", kTiny, 1e6);
   s.finish();
   return l;
-}
-
-/// A 6x6 given by its rows or, when only it is not zero, by its diagonal.
-Mat6 readMatrix(Section& s, std::string_view key, bool semidefinite) {
-  Mat6 A;
-  if (s.has(std::string(key) + "_diagonal"))
-    A = s.vector(std::string(key) + "_diagonal", 6, -kAny, kAny).asDiagonal();
-  else
-    A = s.matrix(key, 6, 6, -kAny, kAny);
-  const std::string fault = definitenessFault(A, semidefinite);
-  if (!fault.empty())
-    s.fail(
-        s.has(std::string(key) + "_diagonal") ? std::string(key) + "_diagonal" : std::string(key),
-        fault);
-  return A;
-}
-
-ModalModel readBase(Section s) {
-  if (!s.has("modes")) {
-    const Mat6 M = readMatrix(s, "mass", false);
-    const Mat6 C = readMatrix(s, "damping", true);
-    const Mat6 K = readMatrix(s, "stiffness", true);
-    s.finish();
-    return modesOf(M, C, K);
-  }
-  Section modes = s.section("modes");
-  const Eigen::VectorXd omega = 2.0 * M_PI * modes.vector("frequency_hz", -1, 0.0, 1e4);
-  const auto k = static_cast<int>(omega.size());
-  if (k > kMaxModes)
-    modes.fail("frequency_hz", fmt::format("{} modes, want at most {}", k, kMaxModes));
-  const Eigen::VectorXd zeta = modes.vector("damping_ratio", k, 0.0, 1e3);
-  ModalModel out;
-  out.Phi = modes.matrix("shapes", 6, k, -kAny, kAny);
-  out.stiffness = omega.cwiseAbs2();
-  out.damping = (2.0 * zeta.cwiseProduct(omega)).asDiagonal();
-  modes.finish();
-  s.finish();
-  return out;
 }
 
 struct Robot {
@@ -451,7 +413,7 @@ Experiment build(const Value& document) {
   c.sensor = {sensor.model.S_proc().inverse(), sensor.X_PS};
   c.stillness.bias = bias / sensor.model.volts_per_count;
   c.safety = readSafety(root.section("safety"), sensor.model.volts_per_count);
-  c.admittance = readBase(root.section("base"));
+  c.admittance = readBase(root.section("base")).modes;
 
   c.payload.X_PS = sensor.X_PS;
   c.payload.top_plate_S = sensor.top_plate_S;
@@ -522,20 +484,32 @@ Experiment parseExperiment(const std::string& resolved, const std::string& name)
   return build(parseDocument(resolved, name));
 }
 
+Interaction interactionOf(const Experiment& experiment, std::int64_t& duration) {
+  const Program& program = experiment.controller.program;
+  int segment = 0;
+  while (segment < program.size &&
+         program.segments[static_cast<std::size_t>(segment)].kind != SegmentKind::kAdmittance)
+    ++segment;
+  if (segment == program.size)
+    throw InputError(
+        fmt::format("{}: no admittance segment, want one in its program", experiment.name));
+  duration = std::llround(program.segments[static_cast<std::size_t>(segment)].duration * 1e9);
+  Interaction out;
+  out.base = experiment.controller.admittance;
+  out.payload = experiment.plant.payload;
+  out.q0 = experiment.plant.initial_joints;
+  for (const plant::RobotEvent& event : experiment.plant.robot_events) {
+    if (event.cue.segment < segment) out.q0(event.move.joint) = event.move.target;
+    if (event.cue.segment == segment) out.moves.push_back({event.cue.after, event.move});
+  }
+  std::stable_sort(out.moves.begin(), out.moves.end(),
+                   [](const TimedMove& a, const TimedMove& b) { return a.start < b.start; });
+  return out;
+}
+
 std::filesystem::path findScenario(const std::string& scenario,
                                    const std::filesystem::path& config) {
-  const std::filesystem::path given(scenario);
-  if (given.extension() == ".yaml") return given;
-  const std::filesystem::path folder = config / "scenarios";
-  const std::filesystem::path named = folder / (scenario + ".yaml");
-  std::error_code error;
-  if (!scenario.empty() && std::filesystem::exists(named, error)) return named;
-  std::vector<std::string> names;
-  for (const auto& entry : std::filesystem::directory_iterator(folder, error))
-    if (entry.path().extension() == ".yaml") names.push_back(entry.path().stem().string());
-  std::sort(names.begin(), names.end());
-  throw InputError(fmt::format("scenario '{}': unknown, want one of {} or a path to a .yaml file",
-                               scenario, fmt::join(names, ", ")));
+  return findFile("scenario", scenario, config / "scenarios");
 }
 
 }  // namespace ves

@@ -104,7 +104,7 @@ Segment move(Words& words, const SafetyLimits& limits) {
   return s;
 }
 
-plant::RobotMove robotMove(Words& words, const Experiment& experiment) {
+RobotMove robotMove(Words& words, const Experiment& experiment) {
   const std::vector<std::string>& names = experiment.joint_names;
   const std::string joint = words.word("joint");
   const auto at = std::find(names.begin(), names.end(), joint);
@@ -112,7 +112,7 @@ plant::RobotMove robotMove(Words& words, const Experiment& experiment) {
     throw InputError(names.empty()
                          ? std::string("there is no robot")
                          : fmt::format("'{}', want one of {}", joint, fmt::join(names, ", ")));
-  plant::RobotMove move;
+  RobotMove move;
   move.joint = static_cast<int>(at - names.begin());
   const Link& link = experiment.controller.payload.robot.link(move.joint);
   const bool turns = link.type == JointType::kRevolute;

@@ -13,15 +13,11 @@ constexpr std::int64_t kMidUpdate = kUpdatePeriod / 2;  // [ns]
 constexpr double kStillSpeed = 1e-9;                    // [m/s]
 constexpr std::int64_t kSettle = 100'000'000;           // [ns] between looks whether all is still
 
-Transform inverse(const Transform& X_AB) {
-  return {X_AB.R.transpose(), X_AB.R.transpose() * -X_AB.p};
-}
-
 }  // namespace
 
 Plant::Plant(const PlantConfig& config)
     : config_(config),
-      carried_(config.payload.robot),
+      carried_(carried(config.payload)),
       sensor_(config.sensor, Noise(config.seed)),
       filter_position_(config.filter_cutoff),
       filter_velocity_(config.filter_cutoff),
@@ -29,22 +25,13 @@ Plant::Plant(const PlantConfig& config)
       sensor_step_(sensor_.prepare(seconds(kUpdatePeriod))),
       position_step_(filter_position_.prepare(seconds(kUpdatePeriod))),
       rate_step_(filter_velocity_.prepare(seconds(kUpdatePeriod))),
-      next_look_(kNever) {
-  const Payload& payload = config_.payload;
-  const Transform X_L0P = inverse(payload.X_PL0());
-  carried_.base = combine(carried_.base, X_L0P * payload.X_PR, payload.adapter_R);
-  carried_.base = combine(carried_.base, X_L0P * payload.X_PS, payload.top_plate_S);
-  X_SL0_ = inverse(payload.X_PS) * payload.X_PL0();
+      next_look_(kNever),
+      joints_(config.payload.robot.joints, config.initial_joints) {
+  X_SL0_ = inverse(config.payload.X_PS) * config.payload.X_PL0();
 
   truth_.P.X = config_.geometry.fromHome(config_.initial_pose);
   truth_.legs.L = legLengths(config_.geometry, truth_.P.X);
   truth_.joints.q = config_.initial_joints;
-  for (int i = 0; i < kMaxJoints; ++i) {
-    const Eigen::Matrix<double, 1, 1> q(config_.initial_joints(i));
-    PathPoint<1> rest;
-    rest.x = q;
-    paths_[static_cast<std::size_t>(i)].path = Quintic<1>(rest, q, 1.0);
-  }
   robot_event_done_.assign(config_.robot_events.size(), false);
   injectors_.resize(config_.faults.size());
   began_.fill(kNever);
@@ -105,17 +92,6 @@ void Plant::startRobotEvents() noexcept {
   planRobotEvent();
 }
 
-bool Plant::moveRobot(const RobotMove& move) noexcept {
-  if (move.joint < 0 || move.joint >= carried_.joints || !std::isfinite(move.target) ||
-      !std::isfinite(move.duration) || !(move.duration > 0.0))
-    return false;
-  JointPath& joint = paths_[static_cast<std::size_t>(move.joint)];
-  const PathPoint<1> from = joint.path.at(seconds(now_ - joint.start));
-  joint.path = Quintic<1>(from, Eigen::Matrix<double, 1, 1>(move.target), move.duration);
-  joint.start = now_;
-  return true;
-}
-
 double Climate::at(double t) const noexcept {
   return mean + 0.5 * swing * std::sin(2.0 * M_PI * (t - rising) / period);
 }
@@ -125,9 +101,7 @@ bool Plant::still() const noexcept {
   if (next_robot_event_ != kNever) return false;
   for (std::size_t i = 0; i < kLegs; ++i)
     if (slaves_[i].code() != 0 || std::abs(actuators_[i].velocity()) > kStillSpeed) return false;
-  for (const JointPath& joint : paths_)
-    if (seconds(now_ - joint.start) < joint.path.duration()) return false;
-  return true;
+  return !joints_.moving(now_);
 }
 
 /// Whole LegSlave periods, so that every phase stays, up to a second before `until`.
@@ -218,18 +192,6 @@ void Plant::readTransducers() noexcept {
   if (slaves_[0].updated()) next_look_ = now_ + kMidUpdate;
 }
 
-JointState Plant::jointsNow() const noexcept {
-  JointState joints;
-  for (int i = 0; i < carried_.joints; ++i) {
-    const JointPath& joint = paths_[static_cast<std::size_t>(i)];
-    const PathPoint<1> at = joint.path.at(seconds(now_ - joint.start));
-    joints.q(i) = at.x(0);
-    joints.q_dot(i) = at.x_dot(0);
-    joints.q_ddot(i) = at.x_ddot(0);
-  }
-  return joints;
-}
-
 Wrench Plant::sensorLoad() const noexcept {
   const Transform X_PL0 = config_.payload.X_PL0();
   const FeltMotion felt = feltMotion(truth_.P, X_PL0, config_.gravity);
@@ -269,7 +231,7 @@ void Plant::look() noexcept {
   guess.R = rotationOf(dt * truth_.P.w) * guess.R;
   const ForwardSolution forward = forwardPose(config_.geometry, legs.L, guess);
   truth_.legs_agree = forward.ok() && forwardMotion(config_.geometry, forward.X_IP, legs, truth_.P);
-  truth_.joints = jointsNow();
+  truth_.joints = joints_.at(now_);
 
   const Wrench F_So_S = sensorLoad();
   sensor_.advance(dt == sensor_step_.dt ? sensor_step_ : sensor_.prepare(dt), F_So_S);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/robot/robot_model.hpp"
 
+#include "ves/robot/payload.hpp"
+
 namespace ves {
 
 RigidBody combine(const RigidBody& a_A, const Transform& X_AB, const RigidBody& b_B) noexcept {
@@ -13,6 +15,36 @@ RigidBody combine(const RigidBody& a_A, const Transform& X_AB, const RigidBody& 
   sum.I_Bcm_B = a_A.I_Bcm_B - a_A.mass * Sa * Sa + X_AB.R * b_B.I_Bcm_B * X_AB.R.transpose() -
                 b_B.mass * Sb * Sb;
   return sum;
+}
+
+RigidBody turned(const Mat3& R_AB, const RigidBody& body_B) noexcept {
+  return {body_B.mass, R_AB * body_B.p_BoBcm_B, R_AB * body_B.I_Bcm_B * R_AB.transpose()};
+}
+
+Mat6 spatialMass(const RigidBody& body) noexcept {
+  const Mat3 S = skew(body.p_BoBcm_B);
+  Mat6 M;
+  M << body.mass * Mat3::Identity(), -body.mass * S,  //
+      body.mass * S, body.I_Bcm_B - body.mass * S * S;
+  return M;
+}
+
+RigidBody locked(const RobotModel& robot, const JointVector& q) noexcept {
+  RigidBody all = robot.base;
+  Transform X_L0Li;
+  for (int i = 0; i < robot.joints; ++i) {
+    X_L0Li = X_L0Li * linkPose(robot.link(i), q(i));
+    all = combine(all, X_L0Li, robot.link(i).body);
+  }
+  return all;
+}
+
+RobotModel carried(const Payload& payload) noexcept {
+  RobotModel all = payload.robot;
+  const Transform X_L0P = inverse(payload.X_PL0());
+  all.base = combine(all.base, X_L0P * payload.X_PR, payload.adapter_R);
+  all.base = combine(all.base, X_L0P * payload.X_PS, payload.top_plate_S);
+  return all;
 }
 
 Transform linkPose(const Link& link, double q) noexcept {

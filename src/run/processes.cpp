@@ -161,7 +161,7 @@ void runPlant(const Experiment& experiment, const ProcessOptions& options,
     while (!stop()) {
       bus.wait(100);
       link.setTime(monotonicNow());
-      for (const plant::RobotMove& move : link.takeMoves()) plant.moveRobot(move);
+      for (const RobotMove& move : link.takeMoves()) plant.moveRobot(move);
       const auto command = link.takeCommand();
       if (!command) continue;
       const auto& [legs, tick] = *command;
@@ -192,7 +192,7 @@ void runPlant(const Experiment& experiment, const ProcessOptions& options,
     bus.drain();
     const std::int64_t now = monotonicNow();
     link.setTime(now);
-    for (const plant::RobotMove& move : link.takeMoves()) plant.moveRobot(move);
+    for (const RobotMove& move : link.takeMoves()) plant.moveRobot(move);
     if (const auto command = link.takeCommand()) plant.command(command->first);
     plant.advance(now - start);
     publish(now, -1);

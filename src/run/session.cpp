@@ -103,7 +103,7 @@ std::optional<Refusal> Session::order(const Order& order) {
   return {};
 }
 
-void Session::moveRobot(const plant::RobotMove& move) {
+void Session::moveRobot(const RobotMove& move) {
   bus_.publish(channel::kRobot, toMessage(move, header(self_, orders_++, monotonicNow())));
 }
 

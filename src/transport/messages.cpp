@@ -159,7 +159,7 @@ truth_t toMessage(const plant::Truth& truth, const header_t& header) noexcept {
   return m;
 }
 
-robot_command_t toMessage(const plant::RobotMove& move, const header_t& header) noexcept {
+robot_command_t toMessage(const RobotMove& move, const header_t& header) noexcept {
   robot_command_t m;
   m.header = header;
   m.joint = move.joint;
@@ -239,11 +239,11 @@ std::optional<LegCommand> fromMessage(const leg_command_t& m) noexcept {
   return c;
 }
 
-std::optional<plant::RobotMove> fromMessage(const robot_command_t& m) noexcept {
+std::optional<RobotMove> fromMessage(const robot_command_t& m) noexcept {
   if (!inRange(m.joint, 0, kMaxJoints - 1) || !inRange(m.target, -kMaxJointValue, kMaxJointValue) ||
       !inRange(m.duration, 1e-3, 1e6))
     return {};
-  return plant::RobotMove{m.joint, m.target, m.duration};
+  return RobotMove{m.joint, m.target, m.duration};
 }
 
 std::optional<Order> fromMessage(const operator_t& m) noexcept {

@@ -8,8 +8,8 @@
 
 #include "support/poses.hpp"
 #include "support/robots.hpp"
-#include "ves/config/modes.hpp"
 #include "ves/run/run.hpp"
+#include "ves/srms/modes.hpp"
 
 namespace ves {
 namespace {

@@ -56,6 +56,11 @@ Value parseDocument(const std::string& text, const std::string& name);
 /// Applies "a.b.c=value" as if it stood in the file.
 void override(Value& document, const std::string& assignment);
 
+/// The file of a `kind` given by path or by its name in `folder`. Throws InputError, listing what
+/// there is.
+std::filesystem::path findFile(const std::string& kind, const std::string& name,
+                               const std::filesystem::path& folder);
+
 /// YAML that parseDocument() reads back to the same document.
 std::string emit(const Value& document);
 

@@ -11,6 +11,7 @@
 #include "ves/config/document.hpp"
 #include "ves/control/test_platform.hpp"
 #include "ves/plant/plant.hpp"
+#include "ves/srms/interaction.hpp"
 
 namespace ves {
 
@@ -38,6 +39,10 @@ Experiment loadExperiment(const std::filesystem::path& file,
 
 /// Reads back what Experiment::resolved holds; `name` stands for a file name in messages.
 Experiment parseExperiment(const std::string& resolved, const std::string& name);
+
+/// Robot and base of the program's first admittance segment, from its start, for the simulation of
+/// chapter 3; `duration` [ns] of the segment. Throws InputError when there is none.
+Interaction interactionOf(const Experiment& experiment, std::int64_t& duration);
 
 /// The file of a scenario given by path or by its name in `config`/scenarios. Throws InputError,
 /// listing what there is.

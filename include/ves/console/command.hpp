@@ -48,10 +48,10 @@ struct Collection {
 
 struct Command {
   Verb verb = Verb::kHelp;
-  Order order;             // of what moves the platform
-  Collection collection;   // of kCollect
-  double wait = 0.0;       // [s] of kWait
-  plant::RobotMove robot;  // of kRobot
+  Order order;            // of what moves the platform
+  Collection collection;  // of kCollect
+  double wait = 0.0;      // [s] of kWait
+  RobotMove robot;        // of kRobot
 };
 
 /// A number in [lo, hi]. Throws InputError that says so.

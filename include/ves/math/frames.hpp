@@ -43,6 +43,11 @@ inline Transform operator*(const Transform& X_AB, const Transform& X_BC) {
   return {X_AB.R * X_BC.R, X_AB.p + X_AB.R * X_BC.p};
 }
 
+/// X_BA from X_AB.
+inline Transform inverse(const Transform& X_AB) {
+  return {X_AB.R.transpose(), X_AB.R.transpose() * -X_AB.p};
+}
+
 /// p_AQ_A = X_AB * p_BQ_B.
 inline Vec3 operator*(const Transform& X_AB, const Vec3& p_BQ_B) {
   return X_AB.p + X_AB.R * p_BQ_B;

@@ -16,11 +16,11 @@
 
 #include "ves/control/program.hpp"
 #include "ves/control/sample.hpp"
-#include "ves/math/quintic.hpp"
 #include "ves/plant/actuator.hpp"
 #include "ves/plant/faults.hpp"
 #include "ves/plant/force_torque_sensor.hpp"
 #include "ves/plant/leg_slave.hpp"
+#include "ves/robot/joint_paths.hpp"
 #include "ves/robot/newton_euler.hpp"
 #include "ves/robot/payload.hpp"
 
@@ -30,13 +30,6 @@ namespace ves::plant {
 enum class LegFilters {
   kNone,
   kOutputs  // one each on the position, velocity and acceleration that forward kinematics reads
-};
-
-/// A fifth-order motion of one joint, from wherever it is.
-struct RobotMove {
-  int joint = 0;          // [-] from 0
-  double target = 0.0;    // [rad | m]
-  double duration = 1.0;  // [s]
 };
 
 struct RobotEvent {
@@ -104,9 +97,8 @@ class Plant {
   /// that names it.
   void command(const LegCommand& command) noexcept;
 
-  /// Starts a joint motion now. Refused (false) when there is no such joint, a value is not a
-  /// number or the duration not positive.
-  bool moveRobot(const RobotMove& move) noexcept;
+  /// Starts a joint motion now; see JointPaths::move().
+  bool moveRobot(const RobotMove& move) noexcept { return joints_.move(move, now_); }
 
   /// Time passes, up to and including the events at `until` [ns]. Where nothing moves, more than
   /// kSkipped of it are passed over at once: the noise goes on from where it was.
@@ -129,7 +121,6 @@ class Plant {
   double current(std::size_t leg) const noexcept;
   void readTransducers() noexcept;
   void look() noexcept;
-  JointState jointsNow() const noexcept;
   void planRobotEvent() noexcept;
   void startRobotEvents() noexcept;
   Wrench sensorLoad() const noexcept;
@@ -162,11 +153,7 @@ class Plant {
   LegCounts home_{}, parked_from_{};
   std::vector<Injector> injectors_;  // one a fault
   std::vector<bool> robot_event_done_;
-  struct JointPath {
-    std::int64_t start = 0;  // [ns]
-    Quintic<1> path;
-  };
-  std::array<JointPath, kMaxJoints> paths_;
+  JointPaths joints_;
   Truth truth_;
 };
 

@@ -18,4 +18,7 @@ struct Payload {
   Transform X_PL0() const { return X_PR * X_RL0; }
 };
 
+/// The robot with the sensor's top plate and the adapter plate counted into its link 0.
+RobotModel carried(const Payload& payload) noexcept;
+
 }  // namespace ves

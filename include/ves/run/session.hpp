@@ -39,7 +39,7 @@ class Session {
   std::optional<Refusal> order(const Order& order);
 
   /// Asks the simulated robot to move a joint.
-  void moveRobot(const plant::RobotMove& move);
+  void moveRobot(const RobotMove& move);
 
   /// A gentle end, as by Ctrl-C.
   void interrupt();

@@ -122,7 +122,7 @@ class PlantLink {
   std::optional<std::pair<LegCommand, std::int64_t>> takeCommand() noexcept {
     return std::exchange(command_, std::nullopt);
   }
-  std::vector<plant::RobotMove> takeMoves() { return std::exchange(moves_, {}); }
+  std::vector<RobotMove> takeMoves() { return std::exchange(moves_, {}); }
   std::int64_t rejected() const noexcept { return rejected_; }
 
  private:
@@ -134,7 +134,7 @@ class PlantLink {
   std::int64_t heard_ = 0;      // [ns]
   std::int64_t sequence_ = -2;  // of the master's last command
   std::optional<std::pair<LegCommand, std::int64_t>> command_;
-  std::vector<plant::RobotMove> moves_;
+  std::vector<RobotMove> moves_;
   std::int64_t rejected_ = 0;
 };
 

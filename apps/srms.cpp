@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// ves srms: the flexible base and the robot on it, without platform (report, chapter 3).
+#include <fmt/ranges.h>
+
+#include <fstream>
+
+#include <fmt/ranges.h>
+
+#include "app.hpp"
+#include "ves/analysis/appendix_e.hpp"
+#include "ves/analysis/loop.hpp"
+#include "ves/config/base.hpp"
+
+namespace {
+
+using namespace ves;
+
+constexpr const char* kDirection[] = {"x", "y", "z", "alpha", "beta", "gamma"};
+
+/// The direction of P that a shape moves most, one metre counted as much as one radian.
+const char* mostly(const Vec6& shape) {
+  Eigen::Index i = 0;
+  shape.cwiseAbs().maxCoeff(&i);
+  return kDirection[i];
+}
+
+int showModes(const std::string& name, const std::vector<std::string>& overrides) {
+  const Base base = loadBase(findBase(name, app::configFolder()), overrides);
+  const ModalModel& m = base.modes;
+  fmt::print("{:>4} {:>10} {:>8} {:>12}  {}\n", "mode", "[Hz]", "zeta", "mass [kg]",
+             "shape at the robot's foot, in P: x y z [m], alpha beta gamma [rad]");
+  for (Eigen::Index i = 0; i < m.stiffness.size(); ++i) {
+    const double omega = std::sqrt(m.stiffness(i));
+    const Vec6 shape = m.Phi.col(i);
+    fmt::print("{:>4} {:>10.4f} {:>8.4f} {:>12.1f}  ", i + 1, omega / (2.0 * M_PI),
+               omega > 0.0 ? m.damping(i, i) / (2.0 * omega) : 0.0,
+               1.0 / shape.head<3>().squaredNorm());
+    for (double s : shape) fmt::print("{:>9.5f}", s);
+    fmt::print("  {}\n", mostly(shape));
+  }
+  fmt::print("mass: of a point at the foot with the same momentum; shapes are mass-normalised\n");
+  if (!base.arm) return app::kDone;
+  const Mat6 C = tipCompliance(*base.arm);
+  fmt::print("\n{} degrees of freedom; stiffness at the foot, other directions free:\n ",
+             base.arm->frame.dofs());
+  for (int i = 0; i < 6; ++i)
+    fmt::print(" {} {:.0f} {}{}", kDirection[i], 1.0 / C(i, i), i < 3 ? "N/m" : "N m/rad",
+               i < 5 ? "," : "\n");
+  return app::kDone;
+}
+
+/// The straight arm beside what has been published of it.
+int showPublished() {
+  const PublishedArm published = loadPublished(app::configFolder() / "arms" / "straight_arm.yaml");
+  fmt::print("straight arm without mass, natural frequencies with a payload [Hz]\n");
+  for (const PublishedFrequencies& row : published.rows) {
+    const Vec6 ours = masslessFrequencies(published.arm, row.payload_P);
+    fmt::print("{}\n", row.name);
+    const auto line = [](const char* name, const char* format, const Vec6& values) {
+      fmt::print("  {:<12}", name);
+      for (double v : values) fmt::print(fmt::runtime(format), v);
+      fmt::print("\n");
+    };
+    line("published", "{:>9.4f}", row.frequency);
+    line("this model", "{:>9.4f}", ours);
+    line("difference", "{:>+8.1f}%", 100.0 * (ours.cwiseQuotient(row.frequency) - Vec6::Ones()));
+  }
+  return app::kDone;
+}
+
+struct Range {
+  Vec6 low = Vec6::Constant(HUGE_VAL), high = Vec6::Constant(-HUGE_VAL);
+  void add(const Vec6& x) {
+    low = low.cwiseMin(x);
+    high = high.cwiseMax(x);
+  }
+  Vec6 size() const { return high - low; }
+};
+
+/// Both models of chapter 3, and how far the report's split is from the whole.
+int simulateBoth(const std::string& scenario, const std::vector<std::string>& overrides,
+                 InteractionOptions options, const std::string& file) {
+  const Experiment e = loadExperiment(findScenario(scenario, app::configFolder()), overrides);
+  app::printWarnings(e);
+  const Interaction interaction = interactionOf(e, options.duration);
+  options.model = InteractionModel::kSplit;
+  const std::vector<InteractionPoint> split = simulate(interaction, options);
+  options.model = InteractionModel::kWhole;
+  const std::vector<InteractionPoint> whole = simulate(interaction, options);
+
+  std::string csv = "t_s";
+  for (const char* model : {"split", "whole"})
+    for (int i = 0; i < 6; ++i)
+      csv += fmt::format(",{}_{}_{}", kDirection[i], model, i < 3 ? "m" : "rad");
+  csv += "\n";
+  Range of_split, of_whole, apart;
+  for (std::size_t i = 0; i < split.size(); ++i) {
+    of_split.add(split[i].x);
+    of_whole.add(whole[i].x);
+    apart.add((split[i].x - whole[i].x).cwiseAbs());
+    csv += fmt::format("{:.6f},{},{}\n", split[i].t, fmt::join(split[i].x, ","),
+                       fmt::join(whole[i].x, ","));
+  }
+  fmt::print("{}: {} modes, {:g} s in free space\n", e.name, interaction.base.stiffness.size(),
+             static_cast<double>(options.duration) * kSecondPerNanosecond);
+  fmt::print("  {:<8}{:>20}{:>20}{:>20}\n", "", "split, peak to peak", "whole, peak to peak",
+             "largest difference");
+  for (int i = 0; i < 6; ++i) {
+    const double scale = i < 3 ? 1e3 : 1.0 / kDegree;
+    const char* unit = i < 3 ? "mm" : "deg";
+    const auto cell = [&](double x) { return fmt::format("{:.5f} {:<3}", x * scale, unit); };
+    fmt::print("  {:<8}{:>20}{:>20}{:>20}\n", kDirection[i], cell(of_split.size()(i)),
+               cell(of_whole.size()(i)), cell(apart.high(i)));
+  }
+  if (!file.empty()) {
+    std::ofstream to(file);
+    to << csv;
+    to.flush();
+    if (!to) throw InputError(fmt::format("--out {}: cannot be written", file));
+  }
+  return app::kDone;
+}
+
+/// What the sampled loop does to the base, with the softest 1, 2, .. modes kept.
+int showLoop(const std::string& scenario, const std::vector<std::string>& overrides) {
+  const Experiment e = loadExperiment(findScenario(scenario, app::configFolder()), overrides);
+  app::printWarnings(e);
+  const JointVector& q = e.plant.initial_joints;
+  const Loop loop = loopOf(e.controller, e.plant, q, Direction::kExtending);
+  fmt::print("{:>5} {:>10} {:>16}   {:>28}   {:>28}\n", "modes", "[Hz]", "mass ratio (E.20)",
+             "legs extending: growth [1/s]", "retracting: growth [1/s]");
+  for (int k = 1; k <= loop.base.stiffness.size(); ++k) {
+    fmt::print("{:>5} {:>10.4f} {:>16.3f} ", k,
+               std::sqrt(loop.base.stiffness(k - 1)) / (2.0 * M_PI),
+               massRatios(softest(loop.base, k), loop.robot_P)(0));
+    for (const Direction direction : {Direction::kExtending, Direction::kRetracting}) {
+      Loop some = loopOf(e.controller, e.plant, q, direction);
+      some.base = softest(some.base, k);
+      const Slowest s = slowest(some);
+      fmt::print("   {:>+12.3f} at {:>7.3f} Hz {}", s.growth, s.frequency,
+                 s.radius < 1.0 ? "   " : "(!)");
+    }
+    fmt::print("\n");
+  }
+  fmt::print("stable: {} modes\n", stableModes(e.controller, e.plant, q));
+  return app::kDone;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  using namespace ves;
+  CLI::App cli("The flexible base and the robot on it, without platform.", "ves srms");
+  cli.require_subcommand(1);
+  std::string name;
+  std::vector<std::string> overrides;
+  CLI::App* modes =
+      cli.add_subcommand("modes", "frequencies and shapes of a base, and its stiffness");
+  modes->add_option("base", name, "name in config/bases, or a .yaml file")->required();
+  modes->add_option("--set", overrides, "KEY.PATH=VALUE as if it stood in the file")
+      ->allow_extra_args(false);
+  CLI::App* simulation =
+      cli.add_subcommand("simulate",
+                         "SRMS-robot: a scenario's robot on its base in free space, with the "
+                         "report's split of the wrench and without");
+  std::string out;
+  InteractionOptions options;
+  simulation->add_option("scenario", name, "name in config/scenarios, or a .yaml file")->required();
+  simulation->add_option("--set", overrides, "KEY.PATH=VALUE as if it stood in the file")
+      ->allow_extra_args(false);
+  simulation->add_option("--tolerance", options.tolerance, "of the integrator, relative")
+      ->check(app::inRange(1e-13, 1e-2))
+      ->capture_default_str();
+  simulation
+      ->add_option("--hold-mass", options.hold_mass,
+                   "steps of 10 ms that the robot's mass matrix is kept for; 0: follows the robot")
+      ->check(CLI::Range(0, 1'000'000));
+  simulation->add_option("--out", out, "file for the motion, CSV");
+  CLI::App* published =
+      cli.add_subcommand("published", "the straight arm beside published frequencies");
+  CLI::App* loop = cli.add_subcommand("loop", "how many modes of a base can be kept");
+  loop->add_option("scenario", name, "name in config/scenarios, or a .yaml file")->required();
+  loop->add_option("--set", overrides, "KEY.PATH=VALUE as if it stood in the file")
+      ->allow_extra_args(false);
+  return app::run(cli, argc, argv, [&] {
+    if (simulation->parsed()) return simulateBoth(name, overrides, options, out);
+    if (published->parsed()) return showPublished();
+    if (loop->parsed()) return showLoop(name, overrides);
+    return showModes(name, overrides);
+  });
+}

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+#include "ves/config/document.hpp"
+#include "ves/srms/arm.hpp"
+
+namespace ves {
+
+/// The base that a robot stands on, by its modes at the robot's foot.
+struct Base {
+  ModalModel modes;             // those that are kept
+  std::optional<ArmModel> arm;  // that they are of
+};
+
+/// One of three: `mass`, `damping`, `stiffness` (6 x 6); `modes`, a table from elsewhere; `arm`, a
+/// chain of beams. Throws InputError.
+Base readBase(Section section);
+
+/// A file of config/bases; `overrides` are "key.path=value". Throws InputError.
+Base loadBase(const std::filesystem::path& file, const std::vector<std::string>& overrides);
+
+/// Frequencies that somebody has published of an arm without mass, and what held at its tip.
+struct PublishedFrequencies {
+  std::string name;
+  RigidBody payload_P;
+  Vec6 frequency = Vec6::Zero();  // [Hz]
+};
+struct PublishedArm {
+  ArmModel arm;
+  std::vector<PublishedFrequencies> rows;
+};
+
+/// Throws InputError.
+PublishedArm loadPublished(const std::filesystem::path& file);
+
+/// The file of a base given by path or by its name in `config`/bases. Throws InputError, listing
+/// what there is.
+std::filesystem::path findBase(const std::string& base, const std::filesystem::path& config);
+
+}  // namespace ves

@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/config/base.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+
+namespace ves {
+namespace {
+
+constexpr double kAny = HUGE_VAL;
+
+/// What is wrong with a matrix that should be symmetric and positive definite (or semidefinite);
+/// empty when nothing is.
+std::string definitenessFault(const Mat6& A, bool semidefinite) {
+  const double scale = A.cwiseAbs().maxCoeff();
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j < i; ++j)
+      if (!(std::abs(A(i, j) - A(j, i)) <= 1e-9 * scale))
+        return fmt::format("not symmetric: entry [{}][{}] is {}, [{}][{}] is {}", i, j, A(i, j), j,
+                           i, A(j, i));
+  const double least = Eigen::SelfAdjointEigenSolver<Mat6>(A).eigenvalues()(0);
+  if (semidefinite ? least >= -1e-12 * scale : least > 1e-12 * scale) return {};
+  return fmt::format(
+      "smallest eigenvalue {:.4g}, want {}", least,
+      semidefinite ? "none below 0 (positive semidefinite)" : "all above 0 (positive definite)");
+}
+
+/// A 6x6 given by its rows or, when only it is not zero, by its diagonal.
+Mat6 readMatrix(Section& s, std::string_view key, bool semidefinite) {
+  Mat6 A;
+  if (s.has(std::string(key) + "_diagonal"))
+    A = s.vector(std::string(key) + "_diagonal", 6, -kAny, kAny).asDiagonal();
+  else
+    A = s.matrix(key, 6, 6, -kAny, kAny);
+  const std::string fault = definitenessFault(A, semidefinite);
+  if (!fault.empty())
+    s.fail(
+        s.has(std::string(key) + "_diagonal") ? std::string(key) + "_diagonal" : std::string(key),
+        fault);
+  return A;
+}
+
+/// Axes of {P} in those that shapes or a tip are given in.
+Mat3 readAxes(Section& s) {
+  if (!s.has("platform_rpy_deg")) return Mat3::Identity();
+  return rotation(s.vector("platform_rpy_deg", 3, -360.0, 360.0) * kDegree);
+}
+
+/// How many modes to keep of `all`; all of them unless `keep_modes` says otherwise.
+int readKeep(Section& s, int all) {
+  const int most = std::min(all, kMaxModes);
+  if (s.has("keep_modes")) return static_cast<int>(s.integer("keep_modes", 1, most));
+  if (all > kMaxModes)
+    s.fail("keep_modes",
+           fmt::format("the base has {} modes, want 1 to {} of them kept", all, most));
+  return all;
+}
+
+/// Modes as NASTRAN prints them, the shapes already at the robot's foot.
+ModalModel readTable(Section s) {
+  const Eigen::VectorXd omega = 2.0 * M_PI * s.vector("frequency_hz", -1, 0.0, 1e4);
+  const auto all = static_cast<int>(omega.size());
+  const Eigen::VectorXd zeta = s.vector("damping_ratio", all, 0.0, 1e3);
+  const Eigen::VectorXd mass = s.vector("generalized_mass", all, 0.0, kAny);
+  for (int i = 0; i < all; ++i)
+    if (!(std::abs(mass(i) - 1.0) <= 1e-3))
+      s.fail("generalized_mass",
+             fmt::format("mode {} has {}, want 1: mass-normalised shapes (divide the mode's shape "
+                         "by the root of its generalised mass)",
+                         i + 1, mass(i)));
+  Eigen::MatrixXd shapes = s.matrix("shapes", 6, all, -kAny, kAny);
+  const Mat3 R_PA = readAxes(s).transpose();
+  shapes.topRows<3>() = R_PA * shapes.topRows<3>();
+  shapes.bottomRows<3>() = R_PA * shapes.bottomRows<3>();
+  s.finish();
+  ModalModel out;
+  out.Phi = shapes;
+  out.stiffness = omega.cwiseAbs2();
+  out.damping = (2.0 * zeta.cwiseProduct(omega)).asDiagonal();
+  return out;
+}
+
+/// The symmetric matrix of {xx, yy, zz, xy, xz, yz}, that a body can have.
+Mat3 readInertia(Section& s, std::string_view key) {
+  const Eigen::VectorXd i = s.vector(key, 6, -1e7, 1e7);
+  Mat3 I;
+  I << i(0), i(3), i(4), i(3), i(1), i(5), i(4), i(5), i(2);
+  const double least = Eigen::SelfAdjointEigenSolver<Mat3>(I).eigenvalues()(0);
+  if (!(least >= -1e-9 * I.norm()))
+    s.fail(key, fmt::format("smallest principal moment {:.4g}, want none below 0", least));
+  return I;
+}
+
+RigidBody readBody(Section s) {
+  RigidBody body;
+  body.mass = s.number("mass_kg", 0.0, 1e6);
+  if (s.has("center_m")) body.p_BoBcm_B = s.vector("center_m", 3, -100.0, 100.0);
+  body.I_Bcm_B = readInertia(s, "inertia_kg_m2");
+  s.finish();
+  return body;
+}
+
+ArmJoint readJoint(Section s, Section& pose) {
+  ArmJoint joint;
+  joint.name = s.text("name");
+  joint.axis = s.vector("axis", 3, -1.0, 1.0);
+  if (!(joint.axis.norm() > 1e-3)) s.fail("axis", "has no direction");
+  joint.axis.normalize();
+  joint.stiffness = s.number("stiffness_nm_per_rad", 1e-3, 1e12);
+  const Eigen::VectorXd range = s.vector("range_deg", 2, -1e4, 1e4);
+  joint.angle = pose.number(joint.name, range(0), range(1)) * kDegree;
+  s.finish();
+  return joint;
+}
+
+ArmBeam readBeam(Section s) {
+  ArmBeam beam;
+  beam.to = s.vector("to_m", 3, -100.0, 100.0);
+  const double length = beam.to.norm();
+  if (!(length > 1e-3)) s.fail("to_m", "has no length, want more than 1 mm");
+  beam.section.EI = s.number("EI_n_m2", 1e-3, 1e15);
+  beam.section.GJ = s.number("GJ_n_m2", 1e-3, 1e15);
+  beam.section.EA = s.number("EA_n", 1e-3, 1e15);
+  beam.section.mass_per_length = s.number("mass_kg", 0.0, 1e6) / length;
+  beam.section.radius = s.number("radius_m", 0.0, 10.0);
+  beam.elements = static_cast<int>(s.integer("elements", 1, 100));
+  s.finish();
+  return beam;
+}
+
+ArmDescription readArm(Section& s) {
+  ArmDescription arm;
+  arm.stiffness_scale = s.number("stiffness_scale", 1e-6, 1e6);
+  arm.damping_ratio = s.number("damping_ratio", 0.0, 1e3);
+  arm.R_TP = readAxes(s);
+  Section pose = s.section("pose_deg");
+  for (Section part : s.list("chain")) {
+    const std::string kind = part.onlyKey({"joint", "beam", "housing"}, {});
+    if (kind == "joint")
+      arm.chain.push_back(readJoint(part.section("joint"), pose));
+    else if (kind == "beam")
+      arm.chain.push_back(readBeam(part.section("beam")));
+    else
+      arm.chain.push_back(ArmHousing{readBody(part.section("housing"))});
+    part.finish();
+  }
+  pose.finish();
+  if (arm.chain.empty()) s.fail("chain", "has no parts");
+  if (s.has("payload")) arm.payload_P = readBody(s.section("payload"));
+  return arm;
+}
+
+}  // namespace
+
+Base readBase(Section s) {
+  Base out;
+  if (s.has("arm")) {
+    Section section = s.section("arm");
+    const ArmDescription arm = readArm(section);
+    section.finish();
+    out.arm = assemble(arm);
+    const int dofs = out.arm->frame.dofs();
+    if (dofs == 0) section.fail("chain", "has nothing that can move");
+    try {
+      out.modes = tipModes(*out.arm, arm.damping_ratio, readKeep(s, dofs));
+    } catch (const std::domain_error&) {
+      section.fail("chain",
+                   "a part that can move has no mass; want mass in every beam, or inertia "
+                   "about every axis of a housing at its end");
+    }
+  } else if (s.has("modes")) {
+    out.modes = readTable(s.section("modes"));
+    const int keep = readKeep(s, static_cast<int>(out.modes.stiffness.size()));
+    out.modes.Phi = out.modes.Phi.leftCols(keep).eval();
+    out.modes.stiffness = out.modes.stiffness.head(keep).eval();
+    out.modes.damping = out.modes.damping.topLeftCorner(keep, keep).eval();
+  } else {
+    const Mat6 M = readMatrix(s, "mass", false);
+    const Mat6 C = readMatrix(s, "damping", true);
+    const Mat6 K = readMatrix(s, "stiffness", true);
+    out.modes = modesOf(M, C, K);
+  }
+  s.finish();
+  return out;
+}
+
+Base loadBase(const std::filesystem::path& file, const std::vector<std::string>& overrides) {
+  Value document = loadDocument(file);
+  for (const std::string& assignment : overrides) override(document, assignment);
+  return readBase(Section(document, ""));
+}
+
+PublishedArm loadPublished(const std::filesystem::path& file) {
+  const Value document = loadDocument(file);
+  Section root(document, "");
+  const Base base = readBase(root.section("base"));
+  if (!base.arm) root.fail("base", "want one that is an arm");
+  PublishedArm out{*base.arm, {}};
+  for (Section row : root.list("rows")) {
+    PublishedFrequencies published;
+    published.name = row.text("name");
+    published.payload_P = readBody(row.section("payload"));
+    published.frequency = row.vector("frequency_hz", 6, 0.0, 1e4);
+    row.finish();
+    out.rows.push_back(published);
+  }
+  root.finish();
+  return out;
+}
+
+std::filesystem::path findBase(const std::string& base, const std::filesystem::path& config) {
+  return findFile("base", base, config / "bases");
+}
+
+}  // namespace ves

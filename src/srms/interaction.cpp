@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/srms/interaction.hpp"
+
+#include <gsl/gsl_errno.h>
+#include <gsl/gsl_odeiv2.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <memory>
+#include <stdexcept>
+
+#include "ves/robot/newton_euler.hpp"
+
+namespace ves {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+struct FreeDriver {
+  void operator()(gsl_odeiv2_driver* d) const { gsl_odeiv2_driver_free(d); }
+};
+
+/// The equations of motion, y = {eta, eta', quaternion of R_IP}.
+class Equations {
+ public:
+  Equations(const Interaction& interaction, const InteractionOptions& options)
+      : base_(interaction.base),
+        robot_(carried(interaction.payload)),
+        X_PL0_(interaction.payload.X_PL0()),
+        options_(options),
+        joints_(robot_.joints, interaction.q0) {}
+
+  Eigen::Index modes() const { return base_.stiffness.size(); }
+  std::size_t size() const { return static_cast<std::size_t>(2 * modes() + 4); }
+
+  VectorXd start() const {
+    const Eigen::Index k = modes();
+    VectorXd y = VectorXd::Zero(2 * k + 4);
+    if (options_.eta.size()) y.head(k) = options_.eta;
+    if (options_.eta_dot.size()) y.segment(k, k) = options_.eta_dot;
+    const Vec3 turned = base_.Phi.bottomRows<3>() * y.head(k);
+    y.tail<4>() = Eigen::Quaterniond(rotation(turned)).coeffs();
+    return y;
+  }
+
+  /// The interval that begins now, `step` steps after the start.
+  void begin(std::int64_t now, std::int64_t step) {
+    now_ = now;
+    if (options_.hold_mass > 0 && step % options_.hold_mass == 0 && step != held_at_) {
+      held_at_ = step;
+      held_ = locked(robot_, joints_.at(now_).q);
+    }
+  }
+  void move(const RobotMove& move) { joints_.move(move, now_); }
+
+  void derivative(double later, const VectorXd& y, VectorXd& dy) const {
+    const Eigen::Index k = modes();
+    const auto eta = y.head(k), eta_dot = y.segment(k, k);
+    const JointState q = joints_.at(now_, later);
+    dy.head(k) = eta_dot;
+    VectorXd right = -base_.stiffness.cwiseProduct(eta) - base_.damping * eta_dot;
+    MatrixXd A;
+    if (options_.model == InteractionModel::kSplit)
+      split(q, eta_dot, A, right);
+    else
+      whole(q, y, A, right);
+    dy.segment(k, k) = A.llt().solve(right);
+    const Vec3 w = base_.Phi.bottomRows<3>() * eta_dot;
+    const Eigen::Quaterniond R_IP(Eigen::Vector4d(y.tail<4>()));
+    dy.tail<4>() = 0.5 * (Eigen::Quaterniond(0.0, w.x(), w.y(), w.z()) * R_IP).coeffs();
+  }
+
+  InteractionPoint point(double t, const VectorXd& y) const {
+    const Eigen::Index k = modes();
+    InteractionPoint p;
+    p.t = t;
+    p.eta = y.head(k);
+    p.eta_dot = y.segment(k, k);
+    p.x = base_.Phi * p.eta;
+    p.x_dot = base_.Phi * p.eta_dot;
+    if (options_.model == InteractionModel::kWhole) {
+      p.R_IP = Eigen::Quaterniond(Eigen::Vector4d(y.tail<4>())).normalized().toRotationMatrix();
+      p.x.tail<3>() = fixedAngles(p.R_IP);
+    }
+    return p;
+  }
+
+ private:
+  /// What the base feels of the robot, about Po in P.
+  Wrench reaction(const JointState& q, const FeltMotion& L0) const {
+    return transfer(X_PL0_, Wrench{} - newtonEuler(robot_, q, L0).F_L0o_L0);
+  }
+
+  RigidBody lockedInP(const JointVector& q) const {
+    return combine(RigidBody{}, X_PL0_, options_.hold_mass > 0 ? held_ : locked(robot_, q));
+  }
+
+  /// (3.11): A, and what stands beside stiffness and damping on its right.
+  void split(const JointState& q, const VectorXd& eta_dot, MatrixXd& A, VectorXd& right) const {
+    const RigidBody robot = lockedInP(q.q);
+    A = augmentedModalMass(base_, robot);
+    const auto Phi_u = base_.Phi.topRows<3>(), Phi_l = base_.Phi.bottomRows<3>();
+    const Mat3 Rx = skew(robot.p_BoBcm_B);
+    const Vec3 w = Phi_l * eta_dot;
+    const Vec3 centripetal = robot.mass * w.cross(Rx * w);
+    right += (Phi_u.transpose() + Phi_l.transpose() * Rx) * centripetal;
+    right += base_.Phi.transpose() * reaction(q, FeltMotion{}).stacked();
+  }
+
+  void whole(const JointState& q, const VectorXd& y, MatrixXd& A, VectorXd& right) const {
+    const Eigen::Index k = modes();
+    BodyMotion P;
+    P.X.R = Eigen::Quaterniond(Eigen::Vector4d(y.tail<4>())).normalized().toRotationMatrix();
+    P.w = base_.Phi.bottomRows<3>() * y.segment(k, k);
+    // The wrench is affine in the base's acceleration: this much without, the locked mass with it.
+    const Wrench F_Po_P = reaction(q, feltMotion(P, X_PL0_, Vec3::Zero()));
+    right += base_.Phi.transpose() * rotate(P.X.R, F_Po_P).stacked();
+    const Mat6 M_1 = spatialMass(turned(P.X.R, combine(RigidBody{}, X_PL0_, locked(robot_, q.q))));
+    A = MatrixXd::Identity(k, k) + base_.Phi.transpose() * M_1 * base_.Phi;
+  }
+
+  const ModalModel& base_;
+  RobotModel robot_;
+  Transform X_PL0_;
+  const InteractionOptions& options_;
+  JointPaths joints_;
+  std::int64_t now_ = 0;       // [ns] start of the interval
+  std::int64_t held_at_ = -1;  // [-] step that A was last computed for
+  RigidBody held_;
+};
+
+}  // namespace
+
+MatrixXd augmentedModalMass(const ModalModel& base, const RigidBody& robot_P) {
+  const auto Phi_u = base.Phi.topRows<3>(), Phi_l = base.Phi.bottomRows<3>();
+  const double m_1 = robot_P.mass;
+  const Mat3 Rx = skew(robot_P.p_BoBcm_B);  // (3.10), of P_c
+  return MatrixXd::Identity(base.Phi.cols(), base.Phi.cols()) + Phi_u.transpose() * m_1 * Phi_u +
+         Phi_l.transpose() * robot_P.I_Bcm_B * Phi_l - Phi_u.transpose() * m_1 * Rx * Phi_l +
+         Phi_l.transpose() * Rx * m_1 * Phi_u - Phi_l.transpose() * Rx * m_1 * Rx * Phi_l;
+}
+
+std::vector<InteractionPoint> simulate(const Interaction& interaction,
+                                       const InteractionOptions& options) {
+  Equations equations(interaction, options);
+  VectorXd y = equations.start();
+
+  gsl_odeiv2_system system;
+  system.function = [](double later, const double state[], double rates[], void* self) -> int {
+    const auto& e = *static_cast<const Equations*>(self);
+    const auto n = static_cast<Eigen::Index>(e.size());
+    VectorXd derivative(n);
+    e.derivative(later, VectorXd::Map(state, n), derivative);
+    VectorXd::Map(rates, n) = derivative;
+    return derivative.allFinite() ? GSL_SUCCESS : GSL_EBADFUNC;
+  };
+  system.jacobian = nullptr;
+  system.dimension = equations.size();
+  system.params = &equations;
+  const double milli = 1e-3 / interaction.base.Phi.cwiseAbs().maxCoeff();  // of eta, at the tip
+  const std::unique_ptr<gsl_odeiv2_driver, FreeDriver> driver(gsl_odeiv2_driver_alloc_y_new(
+      &system, gsl_odeiv2_step_rk8pd, 1e-3, options.tolerance * milli, options.tolerance));
+
+  std::vector<InteractionPoint> out;
+  auto move = interaction.moves.begin();
+  std::int64_t now = 0;
+  for (std::int64_t step = 0; now <= options.duration; ++step) {
+    out.push_back(equations.point(static_cast<double>(now) * kSecondPerNanosecond, y));
+    const std::int64_t end = (step + 1) * options.step;
+    while (now < end) {
+      equations.begin(now, step);
+      for (; move != interaction.moves.end() && move->start <= now; ++move)
+        equations.move(move->move);
+      std::int64_t until = end;
+      if (move != interaction.moves.end()) until = std::min(until, move->start);
+      double later = 0.0;
+      gsl_odeiv2_driver_reset(driver.get());
+      gsl_error_handler_t* const before = gsl_set_error_handler_off();
+      const int status = gsl_odeiv2_driver_apply(
+          driver.get(), &later, static_cast<double>(until - now) * kSecondPerNanosecond, y.data());
+      gsl_set_error_handler(before);
+      if (status != GSL_SUCCESS)
+        throw std::domain_error(
+            "the tolerance cannot be kept: the motion grows without bound, or "
+            "too small a tolerance is asked");
+      now = until;
+    }
+    y.tail<4>().normalize();
+  }
+  return out;
+}
+
+}  // namespace ves

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <functional>
+
+#include "ves/robot/robot_model.hpp"
+
+namespace ves::test {
+
+/// Momentum {linear, about the origin of I} of a robot at t, from poses alone: X_IL0(t), q(t) and
+/// five-point stencils of width h [s].
+inline Vec6 momentum(const RobotModel& robot, const std::function<Transform(double)>& X_IL0,
+                     const std::function<JointVector(double)>& q, double t, double h) {
+  const auto poseOf = [&](int body, double s) {
+    Transform X = X_IL0(s);
+    for (int i = 0; i < body; ++i) X = X * linkPose(robot.link(i), q(s)(i));
+    return X;
+  };
+  Vec6 sum = Vec6::Zero();
+  for (int body = 0; body <= robot.joints; ++body) {
+    const RigidBody& b = body == 0 ? robot.base : robot.link(body - 1).body;
+    const auto com = [&](double s) { return Vec3(poseOf(body, s) * b.p_BoBcm_B); };
+    const auto R = [&](double s) { return poseOf(body, s).R; };
+    const Vec3 v = (com(t - 2 * h) - 8 * com(t - h) + 8 * com(t + h) - com(t + 2 * h)) / (12 * h);
+    const Mat3 W =
+        (R(t - 2 * h) - 8 * R(t - h) + 8 * R(t + h) - R(t + 2 * h)) / (12 * h) * R(t).transpose();
+    const Vec3 w(0.5 * (W(2, 1) - W(1, 2)), 0.5 * (W(0, 2) - W(2, 0)), 0.5 * (W(1, 0) - W(0, 1)));
+    const Mat3 I_I = R(t) * b.I_Bcm_B * R(t).transpose();
+    sum.head<3>() += b.mass * v;
+    sum.tail<3>() += I_I * w + com(t).cross(b.mass * v);
+  }
+  return sum;
+}
+
+}  // namespace ves::test
