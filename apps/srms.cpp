@@ -18,13 +18,6 @@ using namespace ves;
 
 constexpr const char* kDirection[] = {"x", "y", "z", "alpha", "beta", "gamma"};
 
-/// The direction of P that a shape moves most, one metre counted as much as one radian.
-const char* mostly(const Vec6& shape) {
-  Eigen::Index i = 0;
-  shape.cwiseAbs().maxCoeff(&i);
-  return kDirection[i];
-}
-
 int showModes(const std::string& name, const std::vector<std::string>& overrides) {
   const Base base = loadBase(findBase(name, app::configFolder()), overrides);
   const ModalModel& m = base.modes;
@@ -36,8 +29,8 @@ int showModes(const std::string& name, const std::vector<std::string>& overrides
     fmt::print("{:>4} {:>10.4f} {:>8.4f} {:>12.1f}  ", i + 1, omega / (2.0 * M_PI),
                omega > 0.0 ? m.damping(i, i) / (2.0 * omega) : 0.0,
                1.0 / shape.head<3>().squaredNorm());
-    for (double s : shape) fmt::print("{:>9.5f}", s);
-    fmt::print("  {}\n", mostly(shape));
+    for (double s : shape) fmt::print("{:>9.5f}", std::abs(s) < 5e-6 ? 0.0 : s);
+    fmt::print("\n");
   }
   fmt::print("mass: of a point at the foot with the same momentum; shapes are mass-normalised\n");
   if (!base.arm) return app::kDone;

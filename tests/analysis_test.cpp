@@ -94,8 +94,8 @@ TEST(AppendixE, LimitIsAMassRatioOfOne) {  // (E.14): no damping, sampled ever f
 
 TEST(AppendixE, MassRatiosAreThoseOfPhysicalSpace) {  // (E.18) against (E.20)
   const Experiment e = test::experiment("puma_on_table_4_1");
-  const RigidBody robot =
-      combine(RigidBody{}, e.plant.payload.X_PL0(), locked(carried(e.plant.payload), e.plant.initial_joints));
+  const RigidBody robot = combine(RigidBody{}, e.plant.payload.X_PL0(),
+                                  locked(carried(e.plant.payload), e.plant.initial_joints));
   Mat6 M = Mat6::Zero();
   M.diagonal() << 500, 500, 500, 250, 250, 250;
   VectorXd expected = (M.inverse() * spatialMass(robot)).eigenvalues().real();
@@ -112,9 +112,9 @@ double growthOf(const Loop& loop) {
   const Mat6 M_1 = spatialMass(loop.robot_P);
   const double w = loop.sensor_cutoff, f = loop.filter_cutoff;
   struct State {
-    Vec6 y = Vec6::Zero(), v = Vec6::Zero();                           // servo
-    Vec6 f1 = Vec6::Zero(), f2 = Vec6::Zero(), f3 = Vec6::Zero();      // Filter 3
-    Vec6 s = Vec6::Zero(), s_dot = Vec6::Zero();                       // sensor
+    Vec6 y = Vec6::Zero(), v = Vec6::Zero();                       // servo
+    Vec6 f1 = Vec6::Zero(), f2 = Vec6::Zero(), f3 = Vec6::Zero();  // Filter 3
+    Vec6 s = Vec6::Zero(), s_dot = Vec6::Zero();                   // sensor
     VectorXd eta, eta_dot;
   } state;
   state.eta = VectorXd::Zero(k);
@@ -166,8 +166,8 @@ double growthOf(const Loop& loop) {
     next.eta = ahead.eta;
     next.eta_dot = ahead.eta_dot;
     state = next;
-    const double size = std::sqrt(state.eta.cwiseAbs2().dot(loop.base.stiffness) +
-                                  state.eta_dot.squaredNorm());
+    const double size =
+        std::sqrt(state.eta.cwiseAbs2().dot(loop.base.stiffness) + state.eta_dot.squaredNorm());
     if (n >= ticks / 2) {
       log_size += std::log(size);
       counted += loop.period;
@@ -187,7 +187,8 @@ TEST(LoopModel, GrowthIsThatOfTheSampledLoopStepByStep) {
       std::vector<std::string> set = {std::string("legs.filters=") + filters};
       if (std::string(name).find("srms") == 0) set.push_back("base.keep_modes=4");
       const Experiment e = test::experiment(name, set);
-      const Loop loop = loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kExtending);
+      const Loop loop =
+          loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kExtending);
       const Slowest s = slowest(loop);
       // The size of a decaying oscillation beats; a mean over 30 s sees its trend.
       EXPECT_NEAR(growthOf(loop), s.growth, 0.02 * std::abs(s.growth) + 0.02) << name << filters;
@@ -201,15 +202,14 @@ TEST(LoopModel, SaysWhichRunsStopThemselves) {
     int modes;
     bool stable;
   };
-  for (const Case& c : {Case{"srms_unberth_doss", "outputs", 3, true},
-                        Case{"srms_unberth_doss", "outputs", 4, false},
-                        Case{"srms_unberth_doss", "none", 5, true},
-                        Case{"srms_deploy_doss", "none", 6, false},
-                        Case{"srms_capture_puma", "outputs", 2, true},
-                        Case{"srms_capture_puma", "outputs", 4, false}}) {
-    const Experiment e =
-        test::experiment(c.scenario, {std::string("legs.filters=") + c.filters,
-                                      "base.keep_modes=" + std::to_string(c.modes)});
+  for (const Case& c :
+       {Case{"srms_unberth_doss", "outputs", 3, true},
+        Case{"srms_unberth_doss", "outputs", 4, false}, Case{"srms_unberth_doss", "none", 5, true},
+        Case{"srms_deploy_doss", "none", 6, false}, Case{"srms_capture_puma", "outputs", 2, true},
+        Case{"srms_capture_puma", "outputs", 4, false}}) {
+    const Experiment e = test::experiment(
+        c.scenario,
+        {std::string("legs.filters=") + c.filters, "base.keep_modes=" + std::to_string(c.modes)});
     EXPECT_EQ(stableModes(e.controller, e.plant, e.plant.initial_joints) == c.modes, c.stable)
         << c.scenario;
     const RunResult result = runLockstep(e, nullptr, {});

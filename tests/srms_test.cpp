@@ -135,14 +135,15 @@ TEST(BeamModel, FreeFrameHasSixRigidModesAndTheMassOfItsParts) {
   const auto rod = [](const Vec3& from, const Vec3& to) {  // slender, closed form
     const Vec3 d = to - from;
     const double m = kTube.mass_per_length * d.norm();
-    RigidBody b{m, 0.5 * (from + to), m / 12.0 * (d.squaredNorm() * Mat3::Identity() - d * d.transpose())};
+    RigidBody b{m, 0.5 * (from + to),
+                m / 12.0 * (d.squaredNorm() * Mat3::Identity() - d * d.transpose())};
     b.I_Bcm_B += m * kTube.radius * kTube.radius * d * d.transpose() / d.squaredNorm();
     return b;
   };
   RigidBody moved = housing;
   moved.p_BoBcm_B += corner.p;
-  const Mat6 expected = spatialMass(rod(start.p, corner.p)) + spatialMass(rod(corner.p, end.p)) +
-                        spatialMass(moved);
+  const Mat6 expected =
+      spatialMass(rod(start.p, corner.p)) + spatialMass(rod(corner.p, end.p)) + spatialMass(moved);
   const Mat6 M = rigid.transpose() * model.M() * rigid;
   EXPECT_LT((M - expected).cwiseAbs().maxCoeff(), 1e-10 * expected.cwiseAbs().maxCoeff());
 }
@@ -221,8 +222,8 @@ double energy(const Interaction& i, const InteractionPoint& p, const RigidBody& 
               const Mat3& R_IP) {
   const Vec6 twist = i.base.Phi * p.eta_dot;
   const Mat6 M = spatialMass(turned(R_IP, robot_P));
-  return 0.5 * (p.eta_dot.squaredNorm() + i.base.stiffness.dot(p.eta.cwiseAbs2()) +
-                twist.dot(M * twist));
+  return 0.5 *
+         (p.eta_dot.squaredNorm() + i.base.stiffness.dot(p.eta.cwiseAbs2()) + twist.dot(M * twist));
 }
 
 /// Undamped and let go from a large deflection: 0.1 rad, 0.2 m.
@@ -301,7 +302,8 @@ TEST(Interaction, MomentumOfAFreeBaseAndItsRobotStaysZero) {
   i.base.Phi = MatrixXd::Zero(6, 6);
   const double mass = 300.0;
   const Vec3 inertia(40.0, 60.0, 50.0);
-  i.base.Phi.diagonal() << Vec3::Constant(1.0 / std::sqrt(mass)), inertia.cwiseSqrt().cwiseInverse();
+  i.base.Phi.diagonal() << Vec3::Constant(1.0 / std::sqrt(mass)),
+      inertia.cwiseSqrt().cwiseInverse();
   i.base.stiffness = VectorXd::Zero(6);
   i.base.damping = MatrixXd::Zero(6, 6);
   i.moves = {{0, {2, -0.3, 2.0}}, {500'000'000, {0, 0.8, 2.0}}};

@@ -3,8 +3,7 @@
 
 #include <fmt/format.h>
 
-#include <cstdio>
-
+#include "ves/report/gnuplot.hpp"
 #include "ves/report/looks.hpp"
 
 namespace ves {
@@ -12,14 +11,6 @@ namespace {
 
 constexpr const char* kCoordinate[] = {"x", "y", "z", "alpha", "beta", "gamma"};
 constexpr const char* kWrench[] = {"fx", "fy", "fz", "mx", "my", "mz"};
-constexpr const char* kColour[] = {"#0072b2", "#d55e00", "#009e73"};  // distinct to most eyes
-
-/// For gnuplot, between single quotes.
-std::string quoted(const std::string& text) {
-  std::string out = "'";
-  for (const char c : text) out += c == '\'' ? std::string("''") : std::string(1, c);
-  return out + "'";
-}
 
 struct Span {
   double from, to;  // [s]
@@ -114,11 +105,7 @@ std::string driftPage(const std::vector<Look>& looks, const std::string& title) 
 std::vector<std::filesystem::path> draw(const std::string& script,
                                         const std::vector<std::string>& files,
                                         const std::filesystem::path& folder) {
-  std::FILE* gnuplot = popen("gnuplot", "w");
-  if (gnuplot) {
-    std::fputs(fmt::format("cd {}\n{}", quoted(folder.string()), script).c_str(), gnuplot);
-    pclose(gnuplot);
-  }
+  gnuplot(script, folder);
   std::vector<std::filesystem::path> drawn;
   for (const std::string& file : files) {
     std::error_code none;

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// ves report: chapter 4 of the report once more, as a page and as numbers.
+#include <unistd.h>
+
+#include "runner.hpp"
+#include "ves/report/chapter4.hpp"
+#include "ves/report/summary.hpp"
+
+int main(int argc, char** argv) {
+  using namespace ves;
+  CLI::App cli(
+      "Runs every scenario of the report's chapter 4 in lockstep and leaves report.html, one page "
+      "that "
+      "needs nothing beside it, and summary.json.",
+      "ves report");
+  std::string out = "ves-runs/report";
+  cli.add_option("--out", out, "folder for the results")->capture_default_str();
+  return app::run(cli, argc, argv, [&] {
+    const std::filesystem::path folder = makeFolder(out);
+    const bool terminal = isatty(STDERR_FILENO);
+    const std::int64_t start = monotonicNow();
+    const Chapter4 chapter =
+        reproduceChapter4(app::configFolder(), folder, [&](const std::string& what, double done) {
+          fmt::print(stderr, "{}{:3.0f} %  {:<32}{}", terminal ? "\r" : "", 100.0 * done, what,
+                     terminal ? "" : "\n");
+        });
+    if (terminal) fmt::print(stderr, "\r{:40}\r", "");
+    app::writeFile(folder / "report.html", chapter.html);
+    writeSummary(chapter.summary, (folder / "summary.json").string());
+    for (const auto& claim : chapter.summary["claims"])
+      fmt::print("{:<28} {:<17} {}\n", claim["where"].get<std::string>(),
+                 claim["verdict"].get<std::string>(), claim["reached"].get<std::string>());
+    fmt::print("\n{:.0f} s; {}\n",
+               static_cast<double>(monotonicNow() - start) * kSecondPerNanosecond,
+               (folder / "report.html").string());
+    return app::kDone;
+  });
+}

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace ves {
+
+struct Line {
+  std::string name;  // in the key; empty: not there
+  std::vector<double> x, y;
+  int colour = 0;  // [-] 0 to 2
+  bool dashed = false;
+};
+
+struct Panel {
+  std::string x_label, y_label;
+  std::vector<Line> lines;
+  bool log_x = false;
+};
+
+/// One figure as SVG to stand in a page, panels side by side, two a row. Drawn by gnuplot; a
+/// sentence in its place when that fails. Its inks are classes (`ink`, `c0`..`c2`, `grid`) that the
+/// page colours, so that it is read on light and dark.
+std::string svg(const std::vector<Panel>& panels);
+
+}  // namespace ves
