@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/QR>
+#include <iostream>
 #include <random>
 #include <unsupported/Eigen/MatrixFunctions>
 
@@ -105,94 +107,111 @@ TEST(AppendixE, MassRatiosAreThoseOfPhysicalSpace) {  // (E.18) against (E.20)
 
 // --- The machine's loop --------------------------------------------------------------------------
 
-/// The same loop by brute force: Runge-Kutta of servo and filters between samples, the base's
-/// oscillators too.
-double growthOf(const Loop& loop) {
-  const Eigen::Index k = loop.base.stiffness.size();
-  const Mat6 M_1 = spatialMass(loop.robot_P);
-  const double w = loop.sensor_cutoff, f = loop.filter_cutoff;
-  struct State {
-    Vec6 y = Vec6::Zero(), v = Vec6::Zero();                       // servo
-    Vec6 f1 = Vec6::Zero(), f2 = Vec6::Zero(), f3 = Vec6::Zero();  // Filter 3
-    Vec6 s = Vec6::Zero(), s_dot = Vec6::Zero();                   // sensor
-    VectorXd eta, eta_dot;
-  } state;
-  state.eta = VectorXd::Zero(k);
-  state.eta_dot = VectorXd::Ones(k);
-  Vec6 u = Vec6::Zero();
-  VectorXd force = VectorXd::Zero(k);
-  const auto rate = [&](const State& x) {
-    State d;
-    const Vec6 a = (loop.velocity_gain * (u - x.y) - x.v) / loop.tau;
-    d.y = x.v;
-    d.v = a;
-    Vec6 felt = a;
-    if (f > 0.0) {
-      d.f1 = f * (a - x.f1);
-      d.f2 = x.f3;
-      d.f3 = f * f * (x.f1 - x.f2) - f * x.f3;
-      felt = x.f2;
-    }
-    d.s = x.s_dot;
-    d.s_dot = w * w * (felt - x.s) - M_SQRT2 * w * x.s_dot;
-    d.eta = x.eta_dot;
-    d.eta_dot = force - loop.base.stiffness.cwiseProduct(x.eta) - loop.base.damping * x.eta_dot;
-    return d;
+/// One way to set the machine up.
+struct Setting {
+  std::string scenario;
+  std::vector<std::string> set;
+};
+
+std::vector<Setting> settings(int count) {
+  std::mt19937 random(7);
+  const auto pick = [&](std::initializer_list<const char*> of) {
+    return std::string(of.begin()[random() % of.size()]);
   };
-  const auto step = [](const State& x, const State& d, double h) {
-    State y = x;
-    y.y += h * d.y, y.v += h * d.v, y.f1 += h * d.f1, y.f2 += h * d.f2, y.f3 += h * d.f3;
-    y.s += h * d.s, y.s_dot += h * d.s_dot, y.eta += h * d.eta, y.eta_dot += h * d.eta_dot;
-    return y;
+  const auto between = [&](double lo, double hi) {
+    return std::to_string(std::uniform_real_distribution<double>(lo, hi)(random));
   };
-  const auto advance = [&](State x, double T) {
-    constexpr int kSteps = 20;
-    const double h = T / kSteps;
-    for (int i = 0; i < kSteps; ++i) {
-      const State a = rate(x), b = rate(step(x, a, h / 2)), c = rate(step(x, b, h / 2)),
-                  d = rate(step(x, c, h));
-      x = step(step(step(step(x, a, h / 6), b, h / 3), c, h / 3), d, h / 6);
-    }
-    return x;
-  };
-  // The base is computed one period ahead of the platform: its state at a tick is the command.
-  double log_size = 0.0, counted = 0.0;
-  const int ticks = 6000;
-  for (int n = 0; n < ticks; ++n) {
-    force = -loop.base.Phi.transpose() * (M_1 * state.s);
-    const State ahead = advance(state, loop.period);
-    u = loop.base.Phi * ahead.eta;
-    State next = advance(state, loop.period);
-    next.eta = ahead.eta;
-    next.eta_dot = ahead.eta_dot;
-    state = next;
-    const double size =
-        std::sqrt(state.eta.cwiseAbs2().dot(loop.base.stiffness) + state.eta_dot.squaredNorm());
-    if (n >= ticks / 2) {
-      log_size += std::log(size);
-      counted += loop.period;
-    }
-    const double scale = 1.0 / size;
-    state = step(State{Vec6::Zero(), Vec6::Zero(), Vec6::Zero(), Vec6::Zero(), Vec6::Zero(),
-                       Vec6::Zero(), Vec6::Zero(), VectorXd::Zero(k), VectorXd::Zero(k)},
-                 state, scale);
-    u *= scale;
-  }
-  return log_size / counted;
+  std::vector<Setting> out;
+  for (int i = 0; i < count; ++i)
+    out.push_back(
+        {"srms_" + pick({"unberth", "low_hover", "deploy", "capture"}) + "_" +
+             pick({"puma", "doss"}),
+         {"gravity_m_per_s2=0", "sensor.noise=false", "legs.filters=" + pick({"none", "outputs"}),
+          "base.keep_modes=" + pick({"1", "2", "3", "4", "5", "6"}),
+          "base.arm.damping_ratio=" + between(0.005, 0.06),
+          "base.arm.stiffness_scale=" + between(0.4, 2.0),
+          "controller.period_ns=" + pick({"8000000", "10000000", "13333333"}),
+          "legs.K_P=" + pick({"6000", "8500", "11000"}), "sensor.cutoff_hz=" + between(15.0, 40.0),
+          "legs.filter_cutoff_rad_per_s=" + between(25.0, 50.0)}});
+  return out;
 }
 
-TEST(LoopModel, GrowthIsThatOfTheSampledLoopStepByStep) {
-  for (const char* name : {"srms_unberth_doss", "srms_capture_puma", "puma_on_table_4_1"})
-    for (const char* filters : {"none", "outputs"}) {
-      std::vector<std::string> set = {std::string("legs.filters=") + filters};
-      if (std::string(name).find("srms") == 0) set.push_back("base.keep_modes=4");
-      const Experiment e = test::experiment(name, set);
-      const Loop loop =
-          loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kExtending);
-      const Slowest s = slowest(loop);
-      // The size of a decaying oscillation beats; a mean over 30 s sees its trend.
-      EXPECT_NEAR(growthOf(loop), s.growth, 0.02 * std::abs(s.growth) + 0.02) << name << filters;
+TEST(LoopModel, GrowsAsTheWholeSimulationDoes) {
+  // The linear loop's largest root against the nonlinear lockstep run: counts, LegSlaves, both
+  // gains by direction, forward kinematics, sensor. Let go along the root's own shape.
+#ifdef VES_SANITIZE
+  const int count = 10;
+#else
+  const int count = 100;
+#endif
+  int unstable = 0, compared = 0, off = 0;
+  for (const Setting& setting : settings(count)) {
+    Experiment e = test::experiment(setting.scenario, setting.set);
+    const Slowest s =
+        slowest(loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kSwinging));
+    // Growth is watched from 0.06 to 0.25 m/s, below what makes the envelope slow it; a decay from
+    // 30 mm, or 0.25 m/s, until few counts are left.
+    const double fast = 2.0 * M_PI * s.frequency;  // [rad/s]
+    const double start =
+        s.growth > 0.0 ? std::min(0.002, 0.06 / fast) : std::min(0.03, 0.25 / fast);
+    const Vec6 offset = s.shape * start / s.shape.head<3>().norm();
+    Program& program = e.controller.program;
+    program = {};
+    program.segments[0] = test::segment(SegmentKind::kMove);
+    program.segments[1] = test::segment(SegmentKind::kCalibration);
+    program.segments[2] = test::segment(SegmentKind::kMove);
+    program.segments[2].target = Pose::from(offset);
+    program.segments[3] = test::segment(SegmentKind::kAdmittance, 15.0);
+    program.size = 4;
+    e.plant.robot_events.clear();
+
+    const ModalModel& base = e.controller.admittance;
+    const MatrixXd to_modes = base.Phi.completeOrthogonalDecomposition().pseudoInverse();
+    const double T = static_cast<double>(e.controller.period) * 1e-9;
+    std::vector<double> log_size;  // of the base's energy, half
+    runLockstep(e, nullptr, [&](const TickState& state) {
+      if (state.phase == Phase::kRunning && state.segment == 3) {
+        const VectorXd eta = to_modes * state.motion.x, rate = to_modes * state.motion.x_dot;
+        log_size.push_back(0.5 *
+                           std::log(rate.squaredNorm() + base.stiffness.dot(eta.cwiseAbs2())));
+      }
+      return Order();
+    });
+    // Once the other roots have died away.
+    const double settled = s.growth > 0.0 ? std::min(0.5, 0.4 / s.growth) : 1.5;  // [s]
+    const auto first = std::min(log_size.size(), static_cast<std::size_t>(settled / T));
+    std::size_t last = first;
+    while (last < log_size.size() &&
+           std::abs(log_size[last] - log_size[0]) < (s.growth > 0.0 ? 1.5 : 3.5))
+      ++last;
+    double n = 0, t1 = 0, t2 = 0, a1 = 0, at = 0;
+    for (std::size_t i = first; i < last; ++i) {
+      const double t = static_cast<double>(i) * T;
+      n += 1, t1 += t, t2 += t * t, a1 += log_size[i], at += log_size[i] * t;
     }
+    const double growth = (n * at - t1 * a1) / (n * t2 - t1 * t1);
+    std::string what = setting.scenario;
+    for (const std::string& one : setting.set) what += " " + one;
+    // Within 0.15 per second of the limit the two gains by direction decide it.
+    if (std::abs(s.growth) < 0.15) continue;
+    ++compared;
+    unstable += s.growth > 0.0;
+    if (std::isnan(growth)) {  // a stop before there was anything to fit
+      EXPECT_GT(s.growth, 0.0) << what;
+      continue;
+    }
+    EXPECT_GT(growth * s.growth, 0.0) << what;
+    if (n * T < 0.5 || std::abs(growth - s.growth) < 0.1 * std::abs(s.growth)) continue;
+    ++off;
+    std::cout << what << ": " << growth << " per s where the loop says " << s.growth << " at "
+              << s.frequency << " Hz\n";
+  }
+  // What is off keeps modes of 10 to 17 Hz without Filter 3: there a leg's gain changes within the
+  // few counts of a swing, and a second root, near the first, takes over.
+  EXPECT_LE(off, 0.06 * compared);
+  EXPECT_GT(compared, 0.7 * count);
+  EXPECT_GT(unstable, 0.1 * count);
+  EXPECT_LT(unstable, 0.9 * count);
 }
 
 TEST(LoopModel, SaysWhichRunsStopThemselves) {

@@ -2,8 +2,10 @@
 //
 // Controller and plant together, in lockstep: what a run must show.
 #include <gtest/gtest.h>
+
 #include <unistd.h>
 
+#include <complex>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -251,6 +253,45 @@ TEST_F(ClosedLoop, SeriesHasARowATickAndAColumnANumber) {
   EXPECT_EQ(names.size(), all.size());
   for (const char* name : {"t_s", "z_actual_m", "fx_dynamic_n", "leg6_measured_m", "joint_6_rad"})
     EXPECT_TRUE(names.count(name)) << name;
+}
+
+TEST_F(ClosedLoop, WrenchOfASineIsLateByHoldServoAndFilters) {
+  // x = A sin wt, 0.6 Hz: the force of all that the sensor carries, -m x'', is felt later by half a
+  // period of the hold, half an update of the LegSlave and the age of its reading, and the phases
+  // of servo, Filter 3 and the sensor's filter. Equal gains both ways, so that everything is
+  // linear.
+  const double w = 2.0 * M_PI * 0.6;
+  const std::complex<double> s(0.0, w);
+  Experiment e =
+      experiment("doss_on_table_4_1",
+                 {"gravity_m_per_s2=0", "sensor.noise=false",
+                  "legs.gain_retract_in_per_s_per_ma=1.18", "legs.filters=outputs",
+                  "program=[{move: {}}, {calibration: {}}, {trajectory: {duration_s: 10, x: {sine: "
+                  "{amplitude_m: 0.04, frequency_hz: 0.6}}}}]"});
+  const double K = 17.4, tau = 0.0064, f = 30.0, c = 2.0 * M_PI * 20.0;
+  const std::complex<double> servo = K / (s * (tau * s + 1.0) + K);
+  const std::complex<double> filter = 1.0 / ((s / f + 1.0) * (s * s / (f * f) + s / f + 1.0));
+  const std::complex<double> sensor = c * c / (s * s + M_SQRT2 * c * s + c * c);
+  const double expected = -std::arg(servo * filter * sensor) / w + 5.0e-3 + 0.51e-3 + 0.17e-3;
+
+  std::complex<double> force = 0.0, due = 0.0;
+  int n = 0;
+  runLockstep(e, nullptr, [&](const TickState& state) {
+    if (state.phase == Phase::kRunning && state.segment == 2) {
+      const double t = 0.01 * n++;
+      if (t >= 10.0 / 3.0 - 1e-9 && t < 10.0 - 1e-9) {  // four whole swings
+        force += state.dynamic.f.x() * std::exp(-s * t);
+        due += state.due(0) * std::exp(-s * t);
+      }
+    }
+    return Order();
+  });
+  EXPECT_NEAR(std::arg(due / force) / w, expected, 1.5e-3);
+  const RobotModel all = carried(e.plant.payload);
+  double mass = all.base.mass;
+  for (int i = 0; i < all.joints; ++i) mass += all.link(i).body.mass;
+  EXPECT_NEAR(std::abs(force / due), mass * w * w * std::abs(servo * filter * sensor),
+              0.005 * mass * w * w);
 }
 
 }  // namespace

@@ -2,61 +2,176 @@
 #include "ves/analysis/loop.hpp"
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <complex>
 #include <unsupported/Eigen/MatrixFunctions>
+#include <utility>
 
 #include "ves/math/second_order.hpp"
 
 namespace ves {
 namespace {
 
+using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr Eigen::Index kCommand = 2;
-
-/// One direction from held command to sampled, filtered acceleration: x' = A x, y = C x; the
-/// command is the state kCommand.
-struct Channel {
-  MatrixXd A;
-  Eigen::RowVectorXd C;
+/// Leg and sensor of one direction, between two updates: x' = A x + B v_end, where v_end is the
+/// speed that the valve's current leads to. x = {length, speed, Filter 3 (3), sensor (2)}.
+struct Mechanics {
+  static constexpr Index kSize = 7, kLength = 0, kSpeed = 1, kFilter = 2, kSensor = 5;
+  MatrixXd A = MatrixXd::Zero(kSize, kSize);
+  VectorXd B = VectorXd::Zero(kSize);
 };
 
-/// Behind `before`: y'' + c y' + k y = k u.
-Channel behind(const Channel& before, double k, double c) {
-  const Eigen::Index n = before.A.rows();
-  Channel out{MatrixXd::Zero(n + 2, n + 2), Eigen::RowVectorXd::Unit(n + 2, n)};
-  out.A.topLeftCorner(n, n) = before.A;
-  out.A(n, n + 1) = 1.0;
-  out.A.row(n + 1) << k * before.C, -k, -c;
-  return out;
+Mechanics mechanicsOf(const Loop& loop) {
+  Mechanics m;
+  constexpr Index y = Mechanics::kLength, v = Mechanics::kSpeed, f = Mechanics::kFilter,
+                  s = Mechanics::kSensor;
+  m.A(y, v) = 1.0;
+  m.A(v, v) = -1.0 / loop.tau;
+  m.B(v) = 1.0 / loop.tau;
+  // The acceleration (v_end - v) / tau goes into Filter 3, a real pole and a pair, or past it.
+  const double w3 = loop.filter_cutoff, w = loop.sensor_cutoff;
+  const bool filtered = w3 > 0.0;
+  if (filtered) {
+    m.A(f, f) = -w3;
+    m.A(f, v) = -w3 / loop.tau;
+    m.B(f) = w3 / loop.tau;
+    m.A(f + 1, f + 2) = 1.0;
+    m.A(f + 2, f) = w3 * w3;
+    m.A(f + 2, f + 1) = -w3 * w3;
+    m.A(f + 2, f + 2) = -w3;
+  } else  // states that nothing reads, and that must not be roots
+    m.A.block<3, 3>(f, f) = -w * Mat3::Identity();
+  m.A(s, s + 1) = 1.0;
+  m.A(s + 1, s) = -w * w;
+  m.A(s + 1, s + 1) = -M_SQRT2 * w;
+  if (filtered) {
+    m.A(s + 1, f + 1) = w * w;
+  } else {
+    m.A(s + 1, v) = -w * w / loop.tau;
+    m.B(s + 1) = w * w / loop.tau;
+  }
+  return m;
 }
 
-/// Behind `before`: y' = w (u - y).
-Channel behind(const Channel& before, double w) {
-  const Eigen::Index n = before.A.rows();
-  Channel out{MatrixXd::Zero(n + 1, n + 1), Eigen::RowVectorXd::Unit(n + 1, n)};
-  out.A.topLeftCorner(n, n) = before.A;
-  out.A.row(n) << w * before.C, -w;
-  return out;
-}
+/// One direction over a controller period: z <- step z + from_command u. z = {mechanics, v_end, the
+/// first reading of the pair to come, X(k-1) .. X(k-4)}.
+struct Channel {
+  MatrixXd step;
+  VectorXd from_command;
+};
 
 Channel channelOf(const Loop& loop) {
-  // The servo tau y'' + y' = K_v (u - y), then its acceleration, which u drives directly: the held
-  // command is a state that stays, so that everything behind it is driven by states alone.
-  const double k = loop.velocity_gain / loop.tau, c = 1.0 / loop.tau;
-  Channel servo{MatrixXd::Zero(3, 3), Eigen::RowVectorXd(3)};
-  servo.A(0, 1) = 1.0;
-  servo.A.row(1) << -k, -c, k;
-  servo.C << -k, -c, k;
-  Channel all = servo;
-  if (loop.filter_cutoff > 0.0) {  // Butterworth of third order: a real pole and a pair
-    const double w = loop.filter_cutoff;
-    all = behind(behind(all, w), w * w, w);
+  using plant::kTransducerPeriod, plant::kUpdatePeriod;
+  constexpr Index kHeld = Mechanics::kSize, kFirst = kHeld + 1, kHistory = kFirst + 1,
+                  kSize = kHistory + 4,
+                  kCommand = kSize;  // the command stands for itself at the end
+  const Mechanics m = mechanicsOf(loop);
+  const double update = static_cast<double>(kUpdatePeriod) * kSecondPerNanosecond;
+  const int updates = std::max(1, static_cast<int>(std::lround(loop.period / update)));
+  const double h = loop.period / updates;
+  const double between =
+      h * static_cast<double>(kTransducerPeriod) / static_cast<double>(kUpdatePeriod);
+
+  MatrixXd generator = MatrixXd::Zero(kSize + 1, kSize + 1);
+  generator.topLeftCorner(Mechanics::kSize, Mechanics::kSize) = m.A;
+  generator.block(0, kHeld, Mechanics::kSize, 1) = m.B;
+  const auto pass = [&](double dt) { return MatrixXd((generator * dt).exp()); };
+
+  // Update: the pair's second reading is now.
+  MatrixXd X = MatrixXd::Zero(1, kSize + 1);
+  X(0, Mechanics::kLength) = 0.5;
+  X(0, kFirst) = 0.5;
+  MatrixXd next = MatrixXd::Identity(kSize + 1, kSize + 1);
+  next.row(kHeld) = -(loop.velocity_gain + loop.derivative_gain) * X;
+  next(kHeld, kCommand) += loop.velocity_gain;
+  next(kHeld, kHistory + 3) += loop.derivative_gain;
+  next.row(kHistory) = X;
+  for (Index i = 1; i < 4; ++i)
+    next.row(kHistory + i) = MatrixXd::Identity(kSize + 1, kSize + 1).row(kHistory + i - 1);
+  // The pair's first reading, `between` before the next update.
+  MatrixXd read = MatrixXd::Identity(kSize + 1, kSize + 1);
+  read.row(kFirst) = read.row(Mechanics::kLength).eval();
+
+  // The controller's tick falls anywhere between two updates: in the middle, here.
+  const double before = h - between;  // from an update to the first reading
+  MatrixXd all = MatrixXd::Identity(kSize + 1, kSize + 1);
+  const double to_tick = 0.5 * h;
+  const bool read_before_tick = before <= to_tick;
+  if (read_before_tick)
+    all = pass(to_tick) * all;
+  else
+    all = pass(between) * read * pass(before - to_tick) * all;
+  for (int k = 0; k + 1 < updates; ++k) all = pass(between) * read * pass(before) * next * all;
+  all = next * all;
+  if (read_before_tick)
+    all = pass(to_tick - before) * read * pass(before) * all;
+  else
+    all = pass(to_tick) * all;
+  return {all.topLeftCorner(kSize, kSize), all.block(0, kCommand, kSize, 1)};
+}
+
+/// The whole loop over a period, of {eta, eta', six channels, six late wrenches a tick of delay}.
+MatrixXd systemOf(const Loop& loop) {
+  const Channel channel = channelOf(loop);
+  const Index n = channel.step.rows(), k = loop.base.stiffness.size(), d = loop.delay;
+  const MatrixXd& Phi = loop.base.Phi;
+
+  MatrixXd hold = MatrixXd::Zero(2 * k, 2 * k), Gamma = MatrixXd::Zero(2 * k, k);
+  if (loop.base.damping.isDiagonal(0.0)) {
+    for (Index i = 0; i < k; ++i) {
+      const SecondOrderHold one =
+          discretise(loop.base.stiffness(i), loop.base.damping(i, i), loop.period);
+      hold(i, i) = one.Phi(0, 0);
+      hold(i, k + i) = one.Phi(0, 1);
+      hold(k + i, i) = one.Phi(1, 0);
+      hold(k + i, k + i) = one.Phi(1, 1);
+      Gamma(i, i) = one.Gamma(0);
+      Gamma(k + i, i) = one.Gamma(1);
+    }
+  } else {
+    MatrixXd M = MatrixXd::Zero(3 * k, 3 * k);
+    M.block(0, k, k, k).setIdentity();
+    M.block(k, 0, k, k) = -MatrixXd(loop.base.stiffness.asDiagonal());
+    M.block(k, k, k, k) = -loop.base.damping;
+    M.block(k, 2 * k, k, k).setIdentity();
+    const MatrixXd E = (M * loop.period).exp();
+    hold = E.topLeftCorner(2 * k, 2 * k);
+    Gamma = E.topRightCorner(2 * k, k);
   }
-  const double w = loop.sensor_cutoff;
-  return behind(all, w * w, M_SQRT2 * w);
+
+  const Index channels = 2 * k, late = channels + 6 * n, size = late + 6 * d;
+  MatrixXd S = MatrixXd::Zero(size, size);
+  const MatrixXd felt = -Gamma * Phi.transpose() * spatialMass(loop.robot_P);  // of accelerations
+  MatrixXd sampled = MatrixXd::Zero(6, size);
+  for (Index i = 0; i < 6; ++i) sampled(i, channels + i * n + Mechanics::kSensor) = 1.0;
+  MatrixXd used = sampled;
+  if (d > 0) {
+    used.setZero();
+    used.rightCols(6).setIdentity();
+    S.middleRows(late, 6) = sampled;
+    for (Index i = 1; i < d; ++i) S.block(late + 6 * i, late + 6 * (i - 1), 6, 6).setIdentity();
+  }
+  S.topRows(2 * k) = felt * used;
+  S.topLeftCorner(2 * k, 2 * k) += hold;
+  const MatrixXd command = Phi * S.topRows(k);  // Phi eta of the period to come
+  for (Index i = 0; i < 6; ++i) {
+    const Index at = channels + i * n;
+    S.middleRows(at, n) = channel.from_command * command.row(i);
+    S.block(at, at, n, n) += channel.step;
+  }
+  return S;
+}
+
+std::complex<double> largestRoot(const MatrixXd& S) {
+  const Eigen::VectorXcd roots = Eigen::EigenSolver<MatrixXd>(S, false).eigenvalues();
+  Index at = 0;
+  roots.cwiseAbs().maxCoeff(&at);
+  return roots(at);
 }
 
 }  // namespace
@@ -67,60 +182,64 @@ Loop loopOf(const ControllerConfig& controller, const plant::PlantConfig& p, con
   loop.base = controller.admittance;
   loop.robot_P = combine(RigidBody{}, p.payload.X_PL0(), locked(carried(p.payload), q));
   loop.period = static_cast<double>(controller.period) * kSecondPerNanosecond;
+  const double extend = p.actuator.gain_extend, retract = p.actuator.gain_retract;
+  double K = 2.0 * extend * retract / (extend + retract);
+  if (direction == Direction::kExtending) K = extend;
+  if (direction == Direction::kRetracting) K = retract;
   constexpr double kFractional = 256.0;  // eight bits of U, (2.7a)
-  const double amperes_per_metre = p.leg_slave.K_P / kFractional / p.transducer.scale *
-                                   plant::LegSlave::kVoltsPerDigit *
-                                   plant::LegSlave::kAmperesPerVolt;
-  loop.velocity_gain =
-      amperes_per_metre *
-      (direction == Direction::kExtending ? p.actuator.gain_extend : p.actuator.gain_retract);
+  const double speed = K * plant::LegSlave::kVoltsPerDigit * plant::LegSlave::kAmperesPerVolt /
+                       kFractional / p.transducer.scale;
+  loop.velocity_gain = p.leg_slave.K_P * speed;
+  loop.derivative_gain = p.leg_slave.K_D * speed;
   loop.tau = p.actuator.tau;
   loop.filter_cutoff = p.filters == plant::LegFilters::kOutputs ? p.filter_cutoff : 0.0;
   loop.sensor_cutoff = p.sensor.cutoff;
   return loop;
 }
 
+double radius(const Loop& loop) { return std::abs(largestRoot(systemOf(loop))); }
+
 Slowest slowest(const Loop& loop) {
-  const Channel channel = channelOf(loop);
-  const Eigen::Index n = channel.A.rows(), k = loop.base.stiffness.size();
-  // The held command is replaced at each sample: written, not stepped.
-  MatrixXd Ad = (channel.A * loop.period).exp();
-  const VectorXd from_command = Ad.col(kCommand);
-  Ad.col(kCommand).setZero();
-
-  // State {eta, eta', six channels}.
-  MatrixXd hold = MatrixXd::Zero(2 * k, 2 * k), Gamma = MatrixXd::Zero(2 * k, k);
-  for (Eigen::Index i = 0; i < k; ++i) {
-    const SecondOrderHold h =
-        discretise(loop.base.stiffness(i), loop.base.damping(i, i), loop.period);
-    hold(i, i) = h.Phi(0, 0);
-    hold(i, k + i) = h.Phi(0, 1);
-    hold(k + i, i) = h.Phi(1, 0);
-    hold(k + i, k + i) = h.Phi(1, 1);
-    Gamma(i, i) = h.Gamma(0);
-    Gamma(k + i, i) = h.Gamma(1);
-  }
-  const MatrixXd& Phi = loop.base.Phi;
-  const Eigen::Index size = 2 * k + 6 * n;
-  MatrixXd S = MatrixXd::Zero(size, size);
-  S.topLeftCorner(2 * k, 2 * k) = hold;
-  const MatrixXd felt = -Gamma * Phi.transpose() * spatialMass(loop.robot_P);  // 2k x 6
-  for (Eigen::Index d = 0; d < 6; ++d)
-    S.block(0, 2 * k + d * n, 2 * k, n) = felt.col(d) * channel.C;
-  const MatrixXd eta_next = S.topRows(k);
-  for (Eigen::Index d = 0; d < 6; ++d) {
-    S.middleRows(2 * k + d * n, n) = from_command * (Phi.row(d) * eta_next);
-    S.block(2 * k + d * n, 2 * k + d * n, n, n) += Ad;
-  }
-
+  const MatrixXd S = systemOf(loop);
+  const std::complex<double> root = largestRoot(S);
   Slowest out;
-  const Eigen::VectorXcd roots = Eigen::EigenSolver<MatrixXd>(S, false).eigenvalues();
-  for (const std::complex<double>& root : roots) {
-    if (!(std::abs(root) > out.radius)) continue;
-    out.radius = std::abs(root);
-    out.growth = std::log(out.radius) / loop.period;
-    out.frequency = std::abs(std::arg(root)) / (2.0 * M_PI * loop.period);
+  out.radius = std::abs(root);
+  out.growth = std::log(out.radius) / loop.period;
+  out.frequency = std::abs(std::arg(root)) / (2.0 * M_PI * loop.period);
+  // Inverse iteration: one step from a root that is known to rounding.
+  const Eigen::MatrixXcd shifted =
+      S.cast<std::complex<double>>() -
+      root * (1.0 + 1e-10) * Eigen::MatrixXcd::Identity(S.rows(), S.cols());
+  Eigen::VectorXcd vector = Eigen::VectorXcd::Ones(S.rows());
+  const Eigen::PartialPivLU<Eigen::MatrixXcd> lu(shifted);
+  for (int i = 0; i < 3; ++i) vector = lu.solve(vector).normalized();
+  Eigen::Matrix<std::complex<double>, 6, 1> x =
+      loop.base.Phi * vector.head(loop.base.stiffness.size());
+  Index largest = 0;
+  x.cwiseAbs().maxCoeff(&largest);
+  out.shape = (x / x(largest)).real();
+  return out;
+}
+
+Margins margins(const Loop& loop) {
+  Margins out;
+  Loop some = loop;
+  const auto stable = [&] { return radius(some) < 1.0; };
+  const auto heavier = [&](double factor) {
+    some.robot_P.mass = factor * loop.robot_P.mass;
+    some.robot_P.I_Bcm_B = factor * loop.robot_P.I_Bcm_B;
+    return stable();
+  };
+  double lo = 1.0, hi = 1.0;
+  while (hi < Margins::kMostGain && heavier(hi)) lo = std::exchange(hi, 1.25 * hi);
+  for (int i = 0; i < 12 && hi < Margins::kMostGain; ++i) {
+    const double mid = std::sqrt(lo * hi);
+    (heavier(mid) ? lo : hi) = mid;
   }
+  out.gain = std::min(lo, Margins::kMostGain);
+  some = loop;
+  while (out.delay < Margins::kMostDelay && (some.delay = loop.delay + out.delay + 1, stable()))
+    ++out.delay;
   return out;
 }
 
@@ -135,7 +254,7 @@ int stableModes(const ControllerConfig& controller, const plant::PlantConfig& pl
     for (const Direction direction : {Direction::kExtending, Direction::kRetracting}) {
       Loop loop = loopOf(controller, plant, q, direction);
       loop.base = softest(loop.base, k);
-      if (!(slowest(loop).radius < 1.0)) return k - 1;
+      if (!(radius(loop) < 1.0)) return k - 1;
     }
   return all;
 }

@@ -18,8 +18,9 @@ void ForceTorqueSensor::settle(const Wrench& F_So_S) noexcept {
   filter_.settle((volts_per_newton_ * F_So_S.stacked()).array());
 }
 
-void ForceTorqueSensor::advance(const Step& step, const Wrench& F_So_S) noexcept {
+void ForceTorqueSensor::advance(const Step& step, const Wrench& F_So_S, Over over) noexcept {
   const Channels volts = (volts_per_newton_ * F_So_S.stacked()).array();
+  if (over == Over::kConstant) filter_.jump(volts);
   Channels held = Channels::Zero();
   if (noisy_) {
     // White noise of two-sided density noise^2/2, held over the step.

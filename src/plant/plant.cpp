@@ -205,8 +205,11 @@ LegMotion Plant::legOutputs(double dt) noexcept {
     const Actuator& actuator = actuators_[static_cast<std::size_t>(i)];
     out.L(i) = actuator.length();
     out.L_dot(i) = actuator.velocity();
-    out.L_ddot(i) = actuator.acceleration();
   }
+  // The mean since the last look. A valve's step makes the acceleration itself jump; points of it,
+  // joined by lines, would put part of every jump before its time, and a sample that is taken
+  // between two looks shifts that part: together they made the wrench 11 ms early.
+  out.L_ddot = (out.L_dot - truth_.legs.L_dot) / dt;
   truth_.legs = out;
   if (config_.filters == LegFilters::kNone) return out;
   const bool regular = dt == position_step_.dt;
@@ -214,6 +217,7 @@ LegMotion Plant::legOutputs(double dt) noexcept {
   const auto rate = regular ? rate_step_ : filter_velocity_.prepare(dt);
   filter_position_.advance(position, out.L.array());
   filter_velocity_.advance(rate, out.L_dot.array());
+  filter_acceleration_.jump(out.L_ddot.array());
   filter_acceleration_.advance(rate, out.L_ddot.array());
   return {filter_position_.output().matrix(), filter_velocity_.output().matrix(),
           filter_acceleration_.output().matrix()};
@@ -234,7 +238,10 @@ void Plant::look() noexcept {
   truth_.joints = joints_.at(now_);
 
   const Wrench F_So_S = sensorLoad();
-  sensor_.advance(dt == sensor_step_.dt ? sensor_step_ : sensor_.prepare(dt), F_So_S);
+  // Behind Filter 3 the acceleration is smooth again, and known at the end of the step.
+  const auto over = config_.filters == LegFilters::kNone ? ForceTorqueSensor::Over::kConstant
+                                                         : ForceTorqueSensor::Over::kRamp;
+  sensor_.advance(dt == sensor_step_.dt ? sensor_step_ : sensor_.prepare(dt), F_So_S, over);
   truth_.F_Po_I = rotate(truth_.P.X.R, transfer(config_.payload.X_PS, F_So_S));
 }
 

@@ -107,23 +107,27 @@ std::vector<CoupledMode> coupledModes(const Interaction& interaction) {
 }
 
 RingDown ringDown(const Motion& motion, const CoupledMode& mode) {
-  const double omega = 2.0 * M_PI * mode.frequency;
-  double n = 0, t1 = 0, t2 = 0, a1 = 0, at = 0, p1 = 0, pt = 0, phase = 0, first = 0;
-  for (std::size_t i = 0; i < motion.t.size(); ++i) {
-    const double xi = mode.of_tip.dot(motion.x[i]);
-    const double rate = mode.of_tip.dot(motion.x_dot[i]) / omega;
-    const double size = std::hypot(xi, rate);
-    if (i == 0) first = size;
-    if (size < 0.05 * first) break;
-    const double now = std::atan2(-rate, xi);
-    phase = n > 0 ? phase + std::remainder(now - phase, 2.0 * M_PI) : now;
-    const double t = motion.t[i], a = std::log(size);
-    n += 1;
-    t1 += t, t2 += t * t, a1 += a, at += a * t, p1 += phase, pt += phase * t;
+  double turn = 2.0 * M_PI * mode.frequency, decay = 0.0;
+  for (int pass = 0; pass < 6; ++pass) {
+    // xi = a e^{-decay t} cos(turn t + p), and its quadrature, which needs both.
+    double n = 0, t1 = 0, t2 = 0, a1 = 0, at = 0, p1 = 0, pt = 0, phase = 0, first = 0;
+    for (std::size_t i = 0; i < motion.t.size(); ++i) {
+      const double xi = mode.of_tip.dot(motion.x[i]);
+      const double other = -(mode.of_tip.dot(motion.x_dot[i]) + decay * xi) / turn;
+      const double size = std::hypot(xi, other);
+      if (i == 0) first = size;
+      if (size < 0.05 * first) break;
+      const double now = std::atan2(other, xi);
+      phase = n > 0 ? phase + std::remainder(now - phase, 2.0 * M_PI) : now;
+      const double t = motion.t[i], a = std::log(size);
+      n += 1;
+      t1 += t, t2 += t * t, a1 += a, at += a * t, p1 += phase, pt += phase * t;
+    }
+    const double spread = n * t2 - t1 * t1;
+    decay = -(n * at - t1 * a1) / spread;
+    turn = (n * pt - t1 * p1) / spread;
   }
-  const double spread = n * t2 - t1 * t1;
-  const double decay = -(n * at - t1 * a1) / spread, turn = (n * pt - t1 * p1) / spread;
-  return {turn / (2.0 * M_PI), decay / std::hypot(decay, turn)};
+  return {std::hypot(turn, decay) / (2.0 * M_PI), decay / std::hypot(decay, turn)};
 }
 
 }  // namespace ves

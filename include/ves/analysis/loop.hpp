@@ -3,14 +3,20 @@
 // Stability of this machine's force feedback: the base, its sampling, and everything between a
 // command and the reading that answers it.
 //
-//   eta --Phi--> command, held --servo--> platform --M_1--> wrench --sensor filter--> sample -->
-//   eta
+//   eta --Phi--> command, held --LegSlave, valve, cylinder--> platform --M_1--> wrench
+//    ^                                                                            |
+//    +--- admittance model <--- delay, in ticks <--- sample <--- sensor filter <--+
 //
-// Linear, one sampling period a step, exact for what it contains: all modes, all six directions
-// coupled through the robot's inertia, the hold, the servo K_v/(s(tau s + 1)), Filter 3, the
-// sensor's filter. Left out: the LegSlaves' own sampling (0.7 ms), quantisation, and the change of
-// gain with the direction; both directions are looked at instead, as if each lasted.
+// Linear about home, one controller period a step: all modes, all six directions coupled through
+// the robot's inertia at its pose, the LegSlaves' readings, average, update and derivative gain,
+// the actuators K/(s(tau s + 1)), Filter 3 (the one on accelerations), the sensor's filter. Lifted
+// exactly over a period that holds a whole number of LegSlave updates, which the real ones miss by
+// up to half an update (100 Hz: ten for 9.775). All legs have one gain here, so the six directions
+// of the platform pass through six equal channels; which gain is looked at is Direction's. Left
+// out: quantisation, limits, and gravity on a tilting robot, which the controller compensates.
 #pragma once
+
+#include <string>
 
 #include "ves/control/test_platform.hpp"
 #include "ves/plant/plant.hpp"
@@ -19,31 +25,48 @@ namespace ves {
 
 struct Loop {
   ModalModel base;
-  RigidBody robot_P;           // what the sensor carries, joints locked
-  double period = 0.0;         // [s] of the controller
-  double velocity_gain = 0.0;  // [1/s] K_v of the servo, speed per error
-  double tau = 0.0;            // [s] of the actuator
-  double filter_cutoff = 0.0;  // [rad/s] of Filter 3; 0: none
-  double sensor_cutoff = 0.0;  // [rad/s]
+  RigidBody robot_P;             // what the sensor carries, joints locked
+  double period = 0.0;           // [s] of the controller
+  double velocity_gain = 0.0;    // [1/s] of the servo, speed per error of length
+  double derivative_gain = 0.0;  // [1/s] the same for X(k) - X(k-4)
+  double tau = 0.0;              // [s] of the actuator
+  double filter_cutoff = 0.0;    // [rad/s] of Filter 3; 0: none
+  double sensor_cutoff = 0.0;    // [rad/s]
+  int delay = 0;                 // [ticks] that a sample is older than it need be
 };
 
-enum class Direction { kExtending, kRetracting };
+/// The gain of a leg depends on which way it moves. A leg that swings has the harmonic mean, as
+/// long as its speed is nearly a sine.
+enum class Direction { kExtending, kRetracting, kSwinging };
 
-/// The loop of an experiment with its legs all moving one way, the robot's joints at q.
+/// The loop of an experiment, the robot's joints at q.
 Loop loopOf(const ControllerConfig& controller, const plant::PlantConfig& plant,
             const JointVector& q, Direction direction);
 
 /// The root of largest magnitude.
 struct Slowest {
-  double radius = 0.0;     // [-] a period; above 1 the emulation diverges
-  double growth = 0.0;     // [1/s]
-  double frequency = 0.0;  // [Hz]
+  double radius = 0.0;        // [-] a period; above 1 the emulation diverges
+  double growth = 0.0;        // [1/s]
+  double frequency = 0.0;     // [Hz]
+  Vec6 shape = Vec6::Zero();  // [m, rad] of the commanded motion, largest entry 1
 };
 Slowest slowest(const Loop& loop);
 
+/// Without the shape, which costs more than the root.
+double radius(const Loop& loop);
+
+/// Factor on the robot's inertia that the loop bears, and ticks of further delay; from a stable
+/// loop.
+struct Margins {
+  double gain = 0.0;  // [-] at most kMostGain
+  int delay = 0;      // [ticks] at most kMostDelay
+  static constexpr double kMostGain = 64.0;
+  static constexpr int kMostDelay = 50;
+};
+Margins margins(const Loop& loop);
+
 /// How many of the base's modes can be kept: the largest k for which the loop with 1, 2, .. k modes
-/// decays in both directions, with legs.filters as they are and the robot at q. 0 when even one
-/// diverges.
+/// decays with the gain of either direction, the robot at q. 0 when even one diverges.
 int stableModes(const ControllerConfig& controller, const plant::PlantConfig& plant,
                 const JointVector& q);
 

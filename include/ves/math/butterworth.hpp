@@ -46,6 +46,9 @@ class Butterworth2 {
   }
   void advance(const Step& step, const Channels& u) noexcept { advance(step, u, Channels::Zero()); }
 
+  /// The input changes at once: the next step's is constant when it ends at u too.
+  void jump(const Channels& u) noexcept { u_ = u; }
+
   const Channels& output() const noexcept { return y_; }
 
  private:
@@ -91,6 +94,9 @@ class Butterworth3 {
     y_dot_ = slope - w_ * step.decay * A + step.Phi(1, 0) * e + step.Phi(1, 1) * e_dot;
     u_ = u;
   }
+
+  /// The input changes at once: the next step's is constant when it ends at u too.
+  void jump(const Channels& u) noexcept { u_ = u; }
 
   const Channels& output() const noexcept { return y_; }
 

@@ -34,8 +34,10 @@ class ForceTorqueSensor {
   /// As after a long time under the wrench.
   void settle(const Wrench& F_So_S) noexcept;
 
-  /// The wrench runs from its last value to F_So_S over the step, noise on top.
-  void advance(const Step& step, const Wrench& F_So_S) noexcept;
+  /// The wrench runs from its last value to F_So_S over the step, or is F_So_S all along; noise on
+  /// top.
+  enum class Over { kRamp, kConstant };
+  void advance(const Step& step, const Wrench& F_So_S, Over over) noexcept;
 
   /// Sixteen bits, saturating, of all seven channels, `warmer` [C] than when the bias was named.
   AdcCounts convert(double warmer) const noexcept;

@@ -76,7 +76,7 @@ struct PlantConfig {
 /// What nobody but a simulation can know; the controller never reads it.
 struct Truth {
   std::int64_t time = 0;  // [ns]
-  BodyMotion P;           // platform
+  BodyMotion P;           // platform; its accelerations are means since the last look
   Pose x;                 // about home
   Wrench F_Po_I;          // on the platform from all the sensor carries
   JointState joints;

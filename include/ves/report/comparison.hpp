@@ -48,7 +48,7 @@ struct CoupledMode {
 std::vector<CoupledMode> coupledModes(const Interaction& interaction);
 
 struct RingDown {
-  double frequency = 0.0;      // [Hz]
+  double frequency = 0.0;      // [Hz] undamped
   double damping_ratio = 0.0;  // [-]
 };
 
