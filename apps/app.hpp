@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cmath>
 #include <csignal>
 #include <cstdlib>
@@ -12,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "ves/analysis/gate.hpp"
 #include "ves/config/experiment.hpp"
 #include "ves/run/run.hpp"
 
@@ -55,6 +57,7 @@ struct Options {
   std::vector<std::string> overrides;
   std::int64_t seed = -1;
   std::string calibration;
+  bool force = false;
   bool private_bus = false;
   ProcessOptions process;
 
@@ -64,6 +67,9 @@ struct Options {
         ->allow_extra_args(false);
     cli.add_option("--seed", seed, "of the plant's noise")->check(CLI::Range(0, INT32_MAX));
     cli.add_option("--calibration", calibration, "file that a calibration has left");
+  }
+  void addForce(CLI::App& cli) {
+    cli.add_flag("--force", force, "admittance control even where it would diverge");
   }
   void addBus(CLI::App& cli) {
     cli.add_option("--url", process.url, "LCM bus")->capture_default_str();
@@ -75,9 +81,23 @@ struct Options {
   Experiment load() const {
     std::vector<std::string> all = overrides;
     if (seed >= 0) all.push_back(fmt::format("seed={}", seed));
+    if (force) all.push_back("controller.force=true");
     return loadExperiment(findScenario(scenario, configFolder()), all, calibration);
   }
 };
+
+/// Admittance control that would diverge is barred, and said so; a program that has it is refused.
+inline void admitOrRefuse(Experiment& experiment) {
+  const std::string why = admit(experiment.controller, experiment.plant);
+  if (why.empty()) return;
+  const Program& program = experiment.controller.program;
+  const bool wanted =
+      std::any_of(program.segments.begin(), program.segments.begin() + program.size,
+                  [](const Segment& segment) { return segment.kind == SegmentKind::kAdmittance; });
+  if (wanted && !experiment.controller.forced)
+    throw InputError(fmt::format("{}: {}; --force runs it all the same", experiment.name, why));
+  fmt::print(stderr, "warning: {}\n", why);
+}
 
 /// Parses, runs, and turns bad input into one line and status 2.
 inline int run(CLI::App& cli, int argc, char** argv, const std::function<int()>& body) {

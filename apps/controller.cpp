@@ -19,7 +19,10 @@ struct ControllerOptions : RunnerOptions {
 int serve(ControllerOptions& options) {
   if (options.private_bus) enterPrivateBus();
   catchSignals();
-  const RunResult result = runController(options.load(), options.process, [](const TickState&) {
+  Experiment experiment = options.load();
+  const std::string why = admit(experiment.controller, experiment.plant);
+  if (!why.empty()) fmt::print(stderr, "ves controller: {}\n", why);
+  const RunResult result = runController(experiment, options.process, [](const TickState&) {
     return stop_requested ? Order{Request::kStop, {}, {}} : Order();
   });
   if (result.good()) return kDone;
@@ -52,8 +55,10 @@ int console(ControllerOptions& options) {
   if (!options.calibration.empty()) console.calibration = options.calibration;
   console.commands = options.commands;
   console.stop = [] { return stop_requested != 0; };
-  const Experiment experiment = options.load();
+  Experiment experiment = options.load();
   printWarnings(experiment);
+  const std::string why = admit(experiment.controller, experiment.plant);
+  if (!why.empty()) fmt::print(stderr, "warning: {}\n", why);
   catchSignals();
   prepareBus(options, options.plant);
   console.launch = prepareFolder(options, experiment);
@@ -77,6 +82,7 @@ int main(int argc, char** argv) {
       "ves controller");
   app::ControllerOptions options;
   options.addExperiment(cli);
+  options.addForce(cli);
   options.addBus(cli);
   options.addOut(cli);
   cli.add_option("--do", options.commands,

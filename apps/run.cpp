@@ -11,6 +11,7 @@ int main(int argc, char** argv) {
       "ves run");
   app::RunnerOptions options;
   options.addExperiment(cli);
+  options.addForce(cli);
   options.addBus(cli);
   cli.add_option("--out", options.out, "folder for the results; a new one in ves-runs by default");
   cli.add_flag("--two-processes", options.two_processes, "in lockstep too, over the bus");

@@ -59,8 +59,9 @@ inline void prepareBus(RunnerOptions& options, bool alone) {
 }
 
 inline int runExperiment(RunnerOptions& options) {
-  const Experiment experiment = options.load();
+  Experiment experiment = options.load();
   printWarnings(experiment);
+  admitOrRefuse(experiment);
   LaunchOptions launch = prepareFolder(options, experiment);
   catchSignals();
 

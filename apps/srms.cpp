@@ -5,11 +5,7 @@
 
 #include <fstream>
 
-#include <fmt/ranges.h>
-
 #include "app.hpp"
-#include "ves/analysis/appendix_e.hpp"
-#include "ves/analysis/loop.hpp"
 #include "ves/config/base.hpp"
 
 namespace {
@@ -115,31 +111,6 @@ int simulateBoth(const std::string& scenario, const std::vector<std::string>& ov
   return app::kDone;
 }
 
-/// What the sampled loop does to the base, with the softest 1, 2, .. modes kept.
-int showLoop(const std::string& scenario, const std::vector<std::string>& overrides) {
-  const Experiment e = loadExperiment(findScenario(scenario, app::configFolder()), overrides);
-  app::printWarnings(e);
-  const JointVector& q = e.plant.initial_joints;
-  const Loop loop = loopOf(e.controller, e.plant, q, Direction::kExtending);
-  fmt::print("{:>5} {:>10} {:>16}   {:>28}   {:>28}\n", "modes", "[Hz]", "mass ratio (E.20)",
-             "legs extending: growth [1/s]", "retracting: growth [1/s]");
-  for (int k = 1; k <= loop.base.stiffness.size(); ++k) {
-    fmt::print("{:>5} {:>10.4f} {:>16.3f} ", k,
-               std::sqrt(loop.base.stiffness(k - 1)) / (2.0 * M_PI),
-               massRatios(softest(loop.base, k), loop.robot_P)(0));
-    for (const Direction direction : {Direction::kExtending, Direction::kRetracting}) {
-      Loop some = loopOf(e.controller, e.plant, q, direction);
-      some.base = softest(some.base, k);
-      const Slowest s = slowest(some);
-      fmt::print("   {:>+12.3f} at {:>7.3f} Hz {}", s.growth, s.frequency,
-                 s.radius < 1.0 ? "   " : "(!)");
-    }
-    fmt::print("\n");
-  }
-  fmt::print("stable: {} modes\n", stableModes(e.controller, e.plant, q));
-  return app::kDone;
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -172,14 +143,9 @@ int main(int argc, char** argv) {
   simulation->add_option("--out", out, "file for the motion, CSV");
   CLI::App* published =
       cli.add_subcommand("published", "the straight arm beside published frequencies");
-  CLI::App* loop = cli.add_subcommand("loop", "how many modes of a base can be kept");
-  loop->add_option("scenario", name, "name in config/scenarios, or a .yaml file")->required();
-  loop->add_option("--set", overrides, "KEY.PATH=VALUE as if it stood in the file")
-      ->allow_extra_args(false);
   return app::run(cli, argc, argv, [&] {
     if (simulation->parsed()) return simulateBoth(name, overrides, options, out);
     if (published->parsed()) return showPublished();
-    if (loop->parsed()) return showLoop(name, overrides);
     return showModes(name, overrides);
   });
 }

@@ -3,12 +3,14 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/QR>
+#include <filesystem>
 #include <iostream>
 #include <random>
 #include <unsupported/Eigen/MatrixFunctions>
 
 #include "support/rig.hpp"
 #include "ves/analysis/appendix_e.hpp"
+#include "ves/analysis/gate.hpp"
 #include "ves/analysis/loop.hpp"
 #include "ves/run/run.hpp"
 #include "ves/srms/modes.hpp"
@@ -233,6 +235,126 @@ TEST(LoopModel, SaysWhichRunsStopThemselves) {
         << c.scenario;
     const RunResult result = runLockstep(e, nullptr, {});
     EXPECT_EQ(result.good(), c.stable) << c.scenario << " " << c.filters << " " << c.modes;
+  }
+}
+
+TEST(LoopModel, MarginsEndWhereTheRootReachesOne) {
+  const Experiment e = test::experiment("srms_unberth_puma", {"legs.filters=outputs"});
+  Loop loop = loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kExtending);
+  const Margins m = margins(loop);
+  EXPECT_GT(m.gain, 1.05);
+  Loop heavier = loop;
+  heavier.robot_P.mass *= m.gain;
+  heavier.robot_P.I_Bcm_B *= m.gain;
+  EXPECT_NEAR(radius(heavier), 1.0, 1e-4);
+  loop.delay = m.delay;
+  EXPECT_LT(radius(loop), 1.0);
+  ++loop.delay;
+  if (m.delay < Margins::kMostDelay) {
+    EXPECT_GE(radius(loop), 1.0);
+  }
+}
+
+TEST(LoopModel, DelayOfATickIsALongerLag) {
+  // At the softest mode a tick more of lag adds damping: r omega^2 T / (2 (1 + r)), Appendix E's
+  // oscillator with the wrench late by T.
+  const Experiment e = test::experiment("srms_unberth_puma", {"base.keep_modes=1"});
+  Loop loop = loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kExtending);
+  const double before = slowest(loop).growth;
+  loop.delay = 1;
+  const Slowest after = slowest(loop);
+  const double r = massRatios(loop.base, loop.robot_P)(0), w = 2 * M_PI * after.frequency;
+  EXPECT_NEAR(before - after.growth, r * w * w * loop.period / (2 * (1 + r)),
+              0.1 * std::abs(before));
+}
+
+// --- The gate ------------------------------------------------------------------------------------
+
+const std::vector<std::string> kDiverging = {"base.keep_modes=6", "legs.filters=outputs"};
+
+TEST(Gate, NamesWhatGrowsAndWhatItNamesCuresIt) {
+  const Experiment e = test::experiment("srms_deploy_doss", kDiverging);
+  const Verdict v = judge(e.controller, e.plant);
+  ASSERT_FALSE(v.stable);
+  EXPECT_GT(v.worst.growth, 0.0);
+  const std::string said = explain(v);
+  EXPECT_NE(said.find("keep 3 of the 6 modes"), std::string::npos) << said;
+  EXPECT_NE(said.find(" Hz, most in "), std::string::npos) << said;
+  const auto with = [](const std::string& set) {
+    std::vector<std::string> all = kDiverging;
+    all.push_back(set);
+    const Experiment cured = test::experiment("srms_deploy_doss", all);
+    return judge(cured.controller, cured.plant, false).stable;
+  };
+  EXPECT_TRUE(with("base.keep_modes=" + std::to_string(v.stable_modes)));
+  EXPECT_FALSE(with("base.keep_modes=" + std::to_string(v.stable_modes + 1)));
+  EXPECT_TRUE(with("base.arm.damping_ratio=" + std::to_string(v.damping_ratio)));
+}
+
+TEST(Gate, LooksAtEveryPoseOfTheRobot) {
+  // A base so light that the folded robot is just borne; unfolding its elbow, as its program does,
+  // is too much.
+  const auto stable = [](double lighter, const std::string& robot) {
+    Experiment e = test::experiment("doss_on_table_4_1",
+                                    {"program=[{admittance: {duration_s: 5}" + robot + "}]"});
+    e.controller.admittance.Phi *= lighter;
+    return judge(e.controller, e.plant, false).stable;
+  };
+  double lo = 1.0, hi = 100.0;
+  ASSERT_TRUE(stable(lo, ""));
+  ASSERT_FALSE(stable(hi, ""));
+  for (int i = 0; i < 14; ++i) {
+    const double mid = std::sqrt(lo * hi);
+    (stable(mid, "") ? lo : hi) = mid;
+  }
+  EXPECT_TRUE(stable(0.99 * lo, ""));
+  EXPECT_FALSE(
+      stable(0.99 * lo, ", robot: [{at_s: 1, duration_s: 1, joint: joint_4, to_deg_or_m: 0}]"));
+}
+
+TEST(Gate, BarsAdmittanceControlUnlessForced) {
+  Experiment e = test::experiment("srms_deploy_doss", kDiverging);
+  EXPECT_NE(admit(e.controller, e.plant), "");
+  EXPECT_FALSE(e.controller.admissible);
+  test::Rig rig(e);
+  rig.arm();
+  rig.tick(Request::kRun, test::segment(SegmentKind::kAdmittance, 5.0));
+  EXPECT_EQ(rig.state().refusal, Refusal::kUnstable);
+  EXPECT_EQ(rig.state().phase, Phase::kArmed);
+  rig.tick(Request::kRun, test::sine(2, 0.01, 0.5, 1.0));  // anything else is free
+  EXPECT_EQ(rig.state().phase, Phase::kRunning);
+
+  Experiment forced = e;
+  forced.controller.forced = true;
+  EXPECT_NE(admit(forced.controller, forced.plant), "");
+  EXPECT_TRUE(forced.controller.admissible);
+  Experiment good = test::experiment("srms_deploy_doss");
+  EXPECT_EQ(admit(good.controller, good.plant), "");
+  EXPECT_TRUE(good.controller.admissible);
+}
+
+TEST(Gate, ProgramThatComesToItGoesHomeInstead) {
+  Experiment e = test::experiment("srms_deploy_doss", kDiverging);
+  admit(e.controller, e.plant);
+  const RunResult result = runLockstep(e, nullptr, {});
+  EXPECT_TRUE(result.cut_short);
+  EXPECT_EQ(result.phase, Phase::kParked);
+}
+
+TEST(Gate, ScenariosOfTheRepositoryPass) {
+  for (const auto& entry : std::filesystem::directory_iterator(test::configDir() + "/scenarios")) {
+    const Experiment e = loadExperiment(entry.path());
+    EXPECT_TRUE(judge(e.controller, e.plant, false).stable) << entry.path();
+  }
+}
+
+TEST(Gate, WhatIsForcedStopsItselfEvenWhereTheEnvelopeHoldsIt) {
+  for (const char* scenario : {"srms_deploy_puma", "srms_unberth_puma", "srms_capture_puma"}) {
+    const Experiment e = test::experiment(
+        scenario, {"base.keep_modes=6", "legs.filters=outputs", "controller.force=true",
+                   "program=[{move: {}}, {calibration: {}}, {admittance: {duration_s: 60}}]"});
+    const RunResult result = runLockstep(e, nullptr, {});
+    EXPECT_EQ(result.phase, Phase::kStopped) << scenario;
   }
 }
 

@@ -392,6 +392,7 @@ Experiment build(const Value& document) {
   c.gentle_braking = braking("gentle");
   c.stop_braking = braking("stop");
   c.arming_samples = static_cast<int>(controller.integer("arming_samples", 1, 10'000));
+  if (controller.has("force")) c.forced = controller.flag("force");
   c.tare_ramp = controller.number("tare_ramp_s", 0.01, 100.0);
   Section still = controller.section("still");
   c.stillness.leg_counts = static_cast<int>(still.integer("leg_counts", 0, 1000));

@@ -48,18 +48,21 @@ bool Overruns::good(const SafetyLimits& limits, std::int64_t ticks_per_second) c
   return tick_ - late_[(count_ - 1 - allowed) % kKept] > ticks_per_second;
 }
 
-void Oscillation::take(double energy, const JointVector& q, double moved, double period,
+void Oscillation::take(double energy, bool held, const JointVector& q, double moved, double period,
                        double floor) noexcept {
   if (!((q - q_).cwiseAbs().maxCoeff() <= moved)) {
     reset();
     q_ = q;
   }
   most_ = std::max(most_, energy);
+  held_ = held_ || held;
   time_ += period;
   if (time_ < kWindow) return;
-  grown_ = most_ > kGrowth * last_ && most_ > floor && last_ > 0.0 ? grown_ + 1 : 0;
+  const bool grows = most_ > kGrowth * last_ && last_ > 0.0;
+  grown_ = (grows || held_) && most_ > floor ? grown_ + 1 : 0;
   last_ = most_;
   most_ = 0.0;
+  held_ = false;
   time_ = 0.0;
 }
 

@@ -39,6 +39,7 @@ std::string_view name(Refusal refusal) noexcept {
     case Refusal::kNotStopped: return "there is no stop to leave";
     case Refusal::kCauseRemains: return "a safety check still fails";
     case Refusal::kOutside: return "its path fails a safety check";
+    case Refusal::kUnstable: return "with this base and robot the loop would diverge";
     case Refusal::kLoaded: return "the sensor feels too much: calibrate, or take the load away";
     case Refusal::kCount: break;
   }

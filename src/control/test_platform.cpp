@@ -188,9 +188,17 @@ Refusal TestPlatform::obey(const Order& order) noexcept {
   return Refusal::kNone;
 }
 
+Refusal TestPlatform::refusesAdmittance() const noexcept {
+  if (!config_.admissible) return Refusal::kUnstable;
+  return feelsLittle() ? Refusal::kNone : Refusal::kLoaded;
+}
+
 /// Begins an order's segment, unless its path, gone through beforehand, fails a check.
 Refusal TestPlatform::accept(const Segment& segment) noexcept {
-  if (segment.kind == SegmentKind::kAdmittance && !feelsLittle()) return Refusal::kLoaded;
+  if (segment.kind == SegmentKind::kAdmittance) {
+    const Refusal refusal = refusesAdmittance();
+    if (refusal != Refusal::kNone) return refusal;
+  }
   const TickState before = state_;
   begin(segment);
   if (segment.kind != SegmentKind::kMove && segment.kind != SegmentKind::kTrajectory)
@@ -298,8 +306,10 @@ void TestPlatform::beginProgram(int at) noexcept {
     return;
   }
   const Segment& next = config_.program.segments[static_cast<std::size_t>(at)];
-  if (next.kind == SegmentKind::kAdmittance && !feelsLittle()) {
-    state_.refusal = Refusal::kLoaded;
+  const Refusal refusal =
+      next.kind == SegmentKind::kAdmittance ? refusesAdmittance() : Refusal::kNone;
+  if (refusal != Refusal::kNone) {
+    state_.refusal = refusal;
     state_.cut_short = true;
     beginReturn();
     return;
@@ -416,8 +426,10 @@ PathPoint<6> TestPlatform::nextMotion(const Sample& sample) noexcept {
       if (state_.dynamic.stacked().allFinite()) {
         admittance_.step(state_.dynamic);
         envelope();
-        oscillation_.take(admittance_.energy(), sample.q, config_.stillness.joint, period_,
-                          config_.safety.growth_floor);
+        const double floor = config_.safety.growth_floor;
+        oscillation_.take(admittance_.energy(),
+                          state_.slowed < 1.0 && admittance_.kineticEnergy() > floor, sample.q,
+                          config_.stillness.joint, period_, floor);
       }
       return admittance_.motion();
     case SegmentKind::kWatch:

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <memory>
 
+#include "ves/analysis/gate.hpp"
 #include "ves/realtime/realtime.hpp"
 #include "ves/transport/channels.hpp"
 
@@ -141,8 +142,9 @@ class Replayer {
     result_.hash = m.hash;
     result_.version = m.version;
     const Experiment recorded = parseExperiment(m.resolved, log_ + ":configuration");
-    const ControllerConfig& config =
-        options_.with ? options_.with->controller : recorded.controller;
+    const Experiment& used = options_.with ? *options_.with : recorded;
+    ControllerConfig config = used.controller;
+    admit(config, used.plant);
     period_ = config.period;
     platform_ = std::make_unique<TestPlatform>(config);
   }

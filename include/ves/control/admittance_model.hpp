@@ -38,10 +38,9 @@ class AdmittanceModel {
   /// the path stays and only the motion along it is slowed.
   void slow(double share) noexcept;
 
-  /// [J] kinetic and elastic: the modes are mass-normalised.
-  double energy() const noexcept {
-    return 0.5 * (eta_dot_.squaredNorm() + k_.dot(eta_.cwiseAbs2()));
-  }
+  /// [J] the modes are mass-normalised.
+  double kineticEnergy() const noexcept { return 0.5 * eta_dot_.squaredNorm(); }
+  double energy() const noexcept { return kineticEnergy() + 0.5 * k_.dot(eta_.cwiseAbs2()); }
 
   /// (C.7): position, velocity, acceleration at the last step's end.
   const PathPoint<6>& motion() const noexcept { return motion_; }

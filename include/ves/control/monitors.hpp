@@ -73,14 +73,15 @@ class Overruns {
 };
 
 /// Energy of the emulated base, while the robot stands still: a sampled, lagging loop can feed it
-/// (Appendix E), and then it grows window after window.
+/// (Appendix E), and then it grows window after window, or goes on swinging against the envelope.
 class Oscillation {
  public:
   static constexpr double kWindow = 0.5;  // [s]
   static constexpr double kGrowth = 1.2;  // [-] of a window over the last
 
-  /// `energy` [J]; `q` the robot's joints, `moved` [rad | m] what counts as moving.
-  void take(double energy, const JointVector& q, double moved, double period,
+  /// `energy` [J]; `held`: the envelope slows a motion; `q` the robot's joints, `moved` [rad | m]
+  /// what counts as moving.
+  void take(double energy, bool held, const JointVector& q, double moved, double period,
             double floor) noexcept;
   void reset() noexcept { *this = Oscillation(); }
   bool good(const SafetyLimits& limits) const noexcept { return grown_ < limits.growing_windows; }
@@ -89,6 +90,7 @@ class Oscillation {
   double time_ = 0.0;  // [s] in this window
   double most_ = 0.0;  // [J] in this window
   double last_ = 0.0;  // [J] in the one before
+  bool held_ = false;  // in this window
   int grown_ = 0;      // [-] windows in a row
   JointVector q_ = JointVector::Zero();
 };

@@ -65,6 +65,7 @@ enum class Refusal : std::int32_t {
   kCauseRemains,  // a check still fails
   kOutside,       // its path would fail a safety check
   kLoaded,        // the sensor feels more than admittance control should begin with
+  kUnstable,      // admittance control with this base and robot would diverge
   kCount
 };
 

@@ -68,6 +68,8 @@ struct ControllerConfig {
   int arming_samples = 10;              // [-] consecutive ticks with a new sample before arming
   StillnessLimits stillness;            // of a calibration
   double tare_ramp = 1.0;               // [s] over which a tare takes effect
+  bool admissible = true;               // admittance control with this base would not diverge,
+  bool forced = false;                  // or somebody wants it all the same
 };
 
 struct TickInput {
@@ -131,6 +133,7 @@ class TestPlatform {
   void measureWrench(const Sample& sample) noexcept;
   Refusal obey(const Order& order) noexcept;
   Refusal accept(const Segment& segment) noexcept;
+  Refusal refusesAdmittance() const noexcept;
   bool feelsLittle() const noexcept;
   void choosePhase() noexcept;
   void beginProgram(int at) noexcept;

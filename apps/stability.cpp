@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// ves stability: Appendix E as published, and the loop of this machine.
+#include <Eigen/Eigenvalues>
+
+#include "runner.hpp"
+#include "ves/analysis/appendix_e.hpp"
+#include "ves/report/gnuplot.hpp"
+
+namespace {
+
+using namespace ves;
+
+/// The loop with the softest 1, 2, .. modes kept, the verdict on all of them, and its margins.
+int showLoop(const Experiment& e) {
+  const JointVector& q = e.plant.initial_joints;
+  const Loop loop = loopOf(e.controller, e.plant, q, Direction::kExtending);
+  fmt::print("{:>5} {:>10} {:>16}   {:>28}   {:>28}\n", "modes", "[Hz]", "mass ratio (E.20)",
+             "legs extending: growth [1/s]", "retracting: growth [1/s]");
+  for (int k = 1; k <= loop.base.stiffness.size(); ++k) {
+    fmt::print("{:>5} {:>10.4f} {:>17.3f}", k, std::sqrt(loop.base.stiffness(k - 1)) / (2.0 * M_PI),
+               massRatios(softest(loop.base, k), loop.robot_P)(0));
+    for (const Direction direction : {Direction::kExtending, Direction::kRetracting}) {
+      Loop some = loopOf(e.controller, e.plant, q, direction);
+      some.base = softest(some.base, k);
+      const Slowest s = slowest(some);
+      fmt::print("   {:>+10.3f} at {:>7.3f} Hz {:<6}", s.growth, s.frequency,
+                 s.radius < 1.0 ? "" : "grows");
+    }
+    fmt::print("\n");
+  }
+  const Verdict v = judge(e.controller, e.plant);
+  if (!v.stable) {
+    fmt::print("{}\n", explain(v));
+    return app::kTripped;
+  }
+  for (const Direction direction : {Direction::kExtending, Direction::kRetracting}) {
+    const Margins m = margins(loopOf(e.controller, e.plant, q, direction));
+    fmt::print(
+        "stable, legs {}: bears {:.2f} times the robot's inertia, and {}{} ticks of further "
+        "delay\n",
+        direction == Direction::kExtending ? "extending" : "retracting", m.gain,
+        m.delay == Margins::kMostDelay ? "at least " : "", m.delay);
+  }
+  return app::kDone;
+}
+
+/// A parameter of the loop that a map can run over.
+struct Parameter {
+  const char* name;
+  const char* label;
+  void (*set)(Loop& loop, const Loop& original, double value);
+};
+const Parameter kParameters[] = {
+    {"mass", "robot's inertia, times its own",
+     [](Loop& l, const Loop& o, double v) {
+       l.robot_P.mass = v * o.robot_P.mass;
+       l.robot_P.I_Bcm_B = v * o.robot_P.I_Bcm_B;
+     }},
+    {"rate", "controller rate [Hz]", [](Loop& l, const Loop&, double v) { l.period = 1.0 / v; }},
+    {"K_P", "K_P, times its own",
+     [](Loop& l, const Loop& o, double v) { l.velocity_gain = v * o.velocity_gain; }},
+    {"delay", "further delay [ticks]",
+     [](Loop& l, const Loop& o, double v) { l.delay = o.delay + static_cast<int>(v); }},
+    {"filter", "cut-off of Filter 3 [rad/s]",
+     [](Loop& l, const Loop&, double v) { l.filter_cutoff = v; }},
+    {"sensor", "cut-off of the sensor's filter [Hz]",
+     [](Loop& l, const Loop&, double v) { l.sensor_cutoff = 2.0 * M_PI * v; }},
+    {"frequency", "frequencies of the base, times their own",
+     [](Loop& l, const Loop& o, double v) {
+       l.base.stiffness = v * v * o.base.stiffness;
+       l.base.damping = v * o.base.damping;
+     }},
+    {"modes", "modes kept",
+     [](Loop& l, const Loop& o, double v) {
+       l.base = softest(
+           o.base, std::clamp(static_cast<int>(v), 1, static_cast<int>(o.base.stiffness.size())));
+     }},
+};
+
+/// NAME=FROM:TO
+struct MapAxis {
+  const Parameter* parameter = nullptr;
+  double from = 0.0, to = 0.0;
+  double at(int i, int of) const { return from + (to - from) * i / (of - 1); }
+};
+MapAxis axisOf(const std::string& option, const std::string& text) {
+  const std::size_t equals = text.find('='), colon = text.find(':');
+  MapAxis axis;
+  std::string names;
+  for (const Parameter& p : kParameters) {
+    names += (names.empty() ? "" : ", ") + std::string(p.name);
+    if (text.substr(0, equals) == p.name) axis.parameter = &p;
+  }
+  const bool numbers =
+      equals != std::string::npos && colon != std::string::npos && colon > equals &&
+      CLI::detail::lexical_cast(text.substr(equals + 1, colon - equals - 1), axis.from) &&
+      CLI::detail::lexical_cast(text.substr(colon + 1), axis.to);
+  if (!axis.parameter || !numbers || !(axis.from >= 0.0 && axis.to > axis.from && axis.to < 1e6))
+    throw InputError(fmt::format("{} '{}': want NAME=FROM:TO, 0 <= FROM < TO, NAME one of {}",
+                                 option, text, names));
+  return axis;
+}
+
+void draw(const std::string& script, const std::filesystem::path& folder,
+          const std::filesystem::path& picture) {
+  gnuplot(script, folder);
+  fmt::print("{}\n", (folder / picture).string());
+}
+
+constexpr const char* kLook =
+    "set terminal pngcairo noenhanced size 1100,640 font 'DejaVu Sans,12' background '#ffffff'\n"
+    "set border 3 lc rgb '#555555'\nset tics nomirror out\n";
+
+/// Growth of the loop over two of its parameters, the limit drawn in.
+int drawMap(const Experiment& e, const MapAxis& x, const MapAxis& y,
+            const std::filesystem::path& folder) {
+  constexpr int kPoints = 41;
+  std::string csv =
+      fmt::format("{},{},growth_per_s,frequency_hz\n", x.parameter->name, y.parameter->name);
+  std::string data;
+  const Loop original =
+      loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kExtending);
+  for (int j = 0; j < kPoints; ++j) {
+    for (int i = 0; i < kPoints; ++i) {
+      Loop loop = original;
+      x.parameter->set(loop, original, x.at(i, kPoints));
+      const Loop half = loop;
+      y.parameter->set(loop, y.parameter == x.parameter ? original : half, y.at(j, kPoints));
+      const Slowest s = slowest(loop);
+      csv +=
+          fmt::format("{},{},{},{}\n", x.at(i, kPoints), y.at(j, kPoints), s.growth, s.frequency);
+      data += fmt::format("{} {} {}\n", x.at(i, kPoints), y.at(j, kPoints), s.growth);
+    }
+    data += "\n";
+    fmt::print(stderr, "\r{:3.0f} %", 100.0 * (j + 1) / kPoints);
+  }
+  fmt::print(stderr, "\r     \r");
+  app::writeFile(folder / "map.csv", csv);
+  draw(fmt::format(
+           "$map << EOD\n{}EOD\n{}set output 'map.png'\nset title {}\nset xlabel {}\n"
+           "set ylabel {}\nset cblabel 'growth [1/s]'\n"
+           "set palette defined (-1 '#2166ac', 0 '#f7f7f7', 1 '#b2182b')\n"
+           "set cbrange [-3:3]\nset view map\nset contour base\n"
+           "set cntrparam levels discrete 0\nset pm3d map interpolate 4,4\nunset key\n"
+           "set xrange [{}:{}]\nset yrange [{}:{}]\n"
+           "splot $map with pm3d, $map with lines lw 2.5 lc rgb 'black' nosurface\n",
+           data, kLook,
+           quoted(
+               e.name +
+               ": blue decays, red diverges, line: the limit. Legs extending, robot as it stands"),
+           quoted(x.parameter->label), quoted(y.parameter->label), x.from, x.to, y.from, y.to),
+       folder, "map.png");
+  return app::kDone;
+}
+
+/// Figure E.4, its polynomial beside the exact transition, and the limit line.
+int drawPublished(const std::filesystem::path& folder) {
+  std::string csv = "samples_per_period,mass_ratio,pair,third,eigenvalue_difference\n", data;
+  double apart = 0.0;
+  for (int f = 10; f <= 100; f += 5) {
+    for (int i = 0; i <= 80; ++i) {
+      const SampledOscillator o{i / 40.0, static_cast<double>(f), 0.5};
+      const auto z = roots(o);
+      const Eigen::Vector3cd exact = transition(o).eigenvalues();
+      double off = 0.0;
+      for (const std::complex<double>& root : z)
+        off = std::max(off, (exact.array() - root).abs().minCoeff());
+      apart = std::max(apart, off);
+      csv += fmt::format("{},{},{},{},{}\n", f, o.mass_ratio, std::abs(z[0]), std::abs(z[2]), off);
+      data += fmt::format("{} {} {} {}\n", f, o.mass_ratio, std::abs(z[0]), std::abs(z[2]));
+    }
+    data += "\n";
+  }
+  app::writeFile(folder / "figure_e4.csv", csv);
+  std::string script =
+      "$e4 << EOD\n" + data + "EOD\n" + kLook +
+      "set output 'figure_e4.png'\nset multiplot layout 1,2 margins 0.07,0.92,0.13,0.92 "
+      "spacing 0.16,0.1\n"
+      "set xlabel 'f/F, samples a period'\nset ylabel 'mass ratio m1/m'\nset view map\n"
+      "set pm3d map interpolate 4,4\nunset key\nset xrange [10:100]\nset yrange [0:2]\n"
+      "set contour base\nset cntrparam levels discrete 1\n";
+  for (const auto& [title, column] :
+       {std::pair{"(a) magnitude of the pair", 3}, {"(b) magnitude of the third root; line: 1", 4}})
+    script += fmt::format(
+        "set title {}\nset palette defined (0 '#2166ac', 1 '#f7f7f7', 2 '#b2182b')\n"
+        "set cbrange [{}]\nsplot $e4 using 1:2:{} with pm3d, $e4 using 1:2:{} with "
+        "lines lw 2.5 lc rgb 'black' nosurface\n",
+        quoted(title), column == 3 ? "0.7:1.3" : "0:2", column, column);
+  draw(script + "unset multiplot\n", folder, "figure_e4.png");
+  fmt::print("the roots of (E.11) are the eigenvalues of the exact transition to {:.0e}\n", apart);
+  return app::kDone;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App cli("Stability of the force feedback: Appendix E, and the loop of this machine.",
+               "ves stability");
+  cli.require_subcommand(1);
+  app::Options options;
+  CLI::App* loop = cli.add_subcommand(
+      "loop", "a scenario's roots, verdict and margins; status 1 when it would diverge");
+  options.addExperiment(*loop);
+  CLI::App* map = cli.add_subcommand(
+      "map",
+      "growth over two parameters of a scenario's loop, as map.png and map.csv; without a "
+      "scenario figure E.4");
+  std::string scenario, x = "mass=0.1:4", y = "frequency=0.2:3", out = "ves-runs/stability";
+  map->add_option("scenario", scenario, "name in config/scenarios, or a .yaml file");
+  map->add_option("--x", x,
+                  "NAME=FROM:TO: mass, rate, K_P, delay, filter, sensor, frequency, modes")
+      ->capture_default_str();
+  map->add_option("--y", y, "the same")->capture_default_str();
+  map->add_option("--set", options.overrides, "KEY.PATH=VALUE as if it stood in the scenario")
+      ->allow_extra_args(false);
+  map->add_option("--out", out, "folder for the results")->capture_default_str();
+  return app::run(cli, argc, argv, [&] {
+    if (loop->parsed()) {
+      const Experiment e = options.load();
+      app::printWarnings(e);
+      return showLoop(e);
+    }
+    if (scenario.empty()) return drawPublished(makeFolder(out));
+    const MapAxis of_x = axisOf("--x", x), of_y = axisOf("--y", y);
+    options.scenario = scenario;
+    return drawMap(options.load(), of_x, of_y, makeFolder(out));
+  });
+}
