@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // ves stability: Appendix E as published, and the loop of this machine.
+#include <unistd.h>
+
 #include <Eigen/Eigenvalues>
 
 #include "runner.hpp"
@@ -49,29 +51,31 @@ int showLoop(const Experiment& e) {
 struct Parameter {
   const char* name;
   const char* label;
+  double least;
   void (*set)(Loop& loop, const Loop& original, double value);
 };
 const Parameter kParameters[] = {
-    {"mass", "robot's inertia, times its own",
+    {"mass", "robot's inertia, times its own", 0.0,
      [](Loop& l, const Loop& o, double v) {
        l.robot_P.mass = v * o.robot_P.mass;
        l.robot_P.I_Bcm_B = v * o.robot_P.I_Bcm_B;
      }},
-    {"rate", "controller rate [Hz]", [](Loop& l, const Loop&, double v) { l.period = 1.0 / v; }},
-    {"K_P", "K_P, times its own",
+    {"rate", "controller rate [Hz]", 1.0,
+     [](Loop& l, const Loop&, double v) { l.period = 1.0 / v; }},
+    {"K_P", "K_P, times its own", 0.0,
      [](Loop& l, const Loop& o, double v) { l.velocity_gain = v * o.velocity_gain; }},
-    {"delay", "further delay [ticks]",
+    {"delay", "further delay [ticks]", 0.0,
      [](Loop& l, const Loop& o, double v) { l.delay = o.delay + static_cast<int>(v); }},
-    {"filter", "cut-off of Filter 3 [rad/s]",
+    {"filter", "cut-off of Filter 3 [rad/s]", 0.0,
      [](Loop& l, const Loop&, double v) { l.filter_cutoff = v; }},
-    {"sensor", "cut-off of the sensor's filter [Hz]",
+    {"sensor", "cut-off of the sensor's filter [Hz]", 0.1,
      [](Loop& l, const Loop&, double v) { l.sensor_cutoff = 2.0 * M_PI * v; }},
-    {"frequency", "frequencies of the base, times their own",
+    {"frequency", "frequencies of the base, times their own", 0.0,
      [](Loop& l, const Loop& o, double v) {
        l.base.stiffness = v * v * o.base.stiffness;
        l.base.damping = v * o.base.damping;
      }},
-    {"modes", "modes kept",
+    {"modes", "modes kept", 1.0,
      [](Loop& l, const Loop& o, double v) {
        l.base = softest(
            o.base, std::clamp(static_cast<int>(v), 1, static_cast<int>(o.base.stiffness.size())));
@@ -96,9 +100,12 @@ MapAxis axisOf(const std::string& option, const std::string& text) {
       equals != std::string::npos && colon != std::string::npos && colon > equals &&
       CLI::detail::lexical_cast(text.substr(equals + 1, colon - equals - 1), axis.from) &&
       CLI::detail::lexical_cast(text.substr(colon + 1), axis.to);
-  if (!axis.parameter || !numbers || !(axis.from >= 0.0 && axis.to > axis.from && axis.to < 1e6))
-    throw InputError(fmt::format("{} '{}': want NAME=FROM:TO, 0 <= FROM < TO, NAME one of {}",
+  if (!axis.parameter || !numbers || !(axis.to > axis.from && axis.to < 1e6))
+    throw InputError(fmt::format("{} '{}': want NAME=FROM:TO, FROM below TO, NAME one of {}",
                                  option, text, names));
+  if (!(axis.from >= axis.parameter->least))
+    throw InputError(fmt::format("{} '{}': want {} from {} up", option, text, axis.parameter->name,
+                                 axis.parameter->least));
   return axis;
 }
 
@@ -119,6 +126,7 @@ int drawMap(const Experiment& e, const MapAxis& x, const MapAxis& y,
   std::string csv =
       fmt::format("{},{},growth_per_s,frequency_hz\n", x.parameter->name, y.parameter->name);
   std::string data;
+  const bool shown = isatty(STDERR_FILENO) != 0;
   const Loop original =
       loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kExtending);
   for (int j = 0; j < kPoints; ++j) {
@@ -133,9 +141,9 @@ int drawMap(const Experiment& e, const MapAxis& x, const MapAxis& y,
       data += fmt::format("{} {} {}\n", x.at(i, kPoints), y.at(j, kPoints), s.growth);
     }
     data += "\n";
-    fmt::print(stderr, "\r{:3.0f} %", 100.0 * (j + 1) / kPoints);
+    if (shown) fmt::print(stderr, "\r{:3.0f} %", 100.0 * (j + 1) / kPoints);
   }
-  fmt::print(stderr, "\r     \r");
+  if (shown) fmt::print(stderr, "\r     \r");
   app::writeFile(folder / "map.csv", csv);
   draw(fmt::format(
            "$map << EOD\n{}EOD\n{}set output 'map.png'\nset title {}\nset xlabel {}\n"

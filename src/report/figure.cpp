@@ -66,9 +66,9 @@ std::string svg(const std::vector<Panel>& panels) {
       1.0 - 12.0 / height, 0.1, 62.0 / height);
   for (std::size_t p = 0; p < panels.size(); ++p) {
     const Panel& panel = panels[p];
-    script +=
-        fmt::format("{} logscale x\nset xlabel {}\nset ylabel {}\n", panel.log_x ? "set" : "unset",
-                    quoted(panel.x_label), quoted(panel.y_label));
+    script += fmt::format("{}\nset xlabel {}\nset ylabel {}\n",
+                          panel.log_x ? "set logscale x\nset autoscale xfix" : "unset logscale x",
+                          quoted(panel.x_label), quoted(panel.y_label));
     const auto [low, high] = range(panel);
     const double span = high > low ? high - low : 1.0;  // room for the key above
     script += fmt::format("set yrange [{}:{}]\n", low - 0.05 * span, high + 0.16 * span);

@@ -26,7 +26,7 @@ table { border-collapse: collapse; font-size: .85rem; margin: .8rem 0; font-vari
 th, td { text-align: left; vertical-align: top; padding: .3rem .6rem .3rem 0;
   border-bottom: 1px solid var(--line); } th { font-weight: 600; color: var(--soft); }
 table.numbers { font-size: .78rem; } table.numbers td { white-space: nowrap; }
-table.numbers td:not(:first-child), table.numbers th:not(:first-child) { text-align: right; padding-left: .6rem; }
+table.numbers td:not(:first-child), table.numbers th:not(:first-child) { text-align: right; padding: .3rem 0 .3rem .7rem; }
 figure { margin: 1rem 0; } figure svg { width: 100%; height: auto; display: block; }
 figcaption { font-size: .85rem; color: var(--soft); }
 .claim { border-left: 3px solid var(--line); padding: .1rem 0 .1rem .9rem; margin: .8rem 0; font-size: .92rem; }
