@@ -20,8 +20,12 @@ int serve(ControllerOptions& options) {
   if (options.private_bus) enterPrivateBus();
   catchSignals();
   Experiment experiment = options.load();
-  const std::string why = admit(experiment.controller, experiment.plant);
-  if (!why.empty()) fmt::print(stderr, "ves controller: {}\n", why);
+  if (options.process.start) {
+    admitOrRefuse(experiment);
+  } else {
+    const std::string why = admit(experiment.controller, experiment.plant);
+    if (!why.empty()) fmt::print(stderr, "ves controller: {}\n", why);
+  }
   const RunResult result = runController(experiment, options.process, [](const TickState&) {
     return stop_requested ? Order{Request::kStop, {}, {}} : Order();
   });

@@ -38,6 +38,7 @@ int main(int argc, char** argv) {
     });
     fmt::print("{}: {} (configuration {}, version {}), {} ticks replayed\n", log, r.name, r.hash,
                r.version, r.ticks);
+    if (!r.barred.empty()) fmt::print("admittance control was barred: {}\n", r.barred);
     if (r.cause != Check::kCount)
       fmt::print("stopped in tick {} by: {}\n", r.cause_tick, name(r.cause));
     if (other)

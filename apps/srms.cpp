@@ -73,6 +73,19 @@ int simulateBoth(const std::string& scenario, const std::vector<std::string>& ov
   const Experiment e = loadExperiment(findScenario(scenario, app::configFolder()), overrides);
   app::printWarnings(e);
   const Interaction interaction = interactionOf(e, options.duration);
+  // The integrator is explicit: it follows every vibration, kept or not by damping.
+  constexpr double kFastest = 1000.0;  // [Hz]
+  const double fastest = std::sqrt(interaction.base.stiffness.maxCoeff()) / (2.0 * M_PI);
+  if (!(fastest <= kFastest))
+    throw InputError(
+        fmt::format("{}: base.keep_modes: the stiffest of the {} modes has {:.0f} Hz; "
+                    "keep those up to {:.0f} Hz",
+                    e.name, interaction.base.stiffness.size(), fastest, kFastest));
+  std::ofstream to;
+  if (!file.empty()) {
+    to.open(file);
+    if (!to) throw InputError(fmt::format("--out {}: cannot be written", file));
+  }
   options.model = InteractionModel::kSplit;
   const std::vector<InteractionPoint> split = simulate(interaction, options);
   options.model = InteractionModel::kWhole;
@@ -103,7 +116,6 @@ int simulateBoth(const std::string& scenario, const std::vector<std::string>& ov
                cell(of_whole.size()(i)), cell(apart.high(i)));
   }
   if (!file.empty()) {
-    std::ofstream to(file);
     to << csv;
     to.flush();
     if (!to) throw InputError(fmt::format("--out {}: cannot be written", file));

@@ -27,22 +27,24 @@ int showLoop(const Experiment& e) {
       some.base = softest(some.base, k);
       const Slowest s = slowest(some);
       fmt::print("   {:>+10.3f} at {:>7.3f} Hz {:<6}", s.growth, s.frequency,
-                 s.radius < 1.0 ? "" : "grows");
+                 decays(some) ? "" : "grows");
     }
     fmt::print("\n");
   }
-  const Verdict v = judge(e.controller, e.plant);
+  const LoopVerdict v = judge(e.controller, e.plant);
   if (!v.stable) {
     fmt::print("{}\n", explain(v));
     return app::kTripped;
   }
   for (const Direction direction : {Direction::kExtending, Direction::kRetracting}) {
-    const Margins m = margins(loopOf(e.controller, e.plant, q, direction));
+    const bool extending = direction == Direction::kExtending;
+    const Margins m = margins(extending ? v.extending : v.retracting);
+    const auto least = [](bool most) { return most ? "at least " : ""; };
     fmt::print(
-        "stable, legs {}: bears {:.2f} times the robot's inertia, and {}{} ticks of further "
-        "delay\n",
-        direction == Direction::kExtending ? "extending" : "retracting", m.gain,
-        m.delay == Margins::kMostDelay ? "at least " : "", m.delay);
+        "stable, legs {}: where it is worst, bears {}{:.2f} times the robot's inertia, and {}{} "
+        "ticks of further delay\n",
+        extending ? "extending" : "retracting", least(m.gain >= Margins::kMostGain), m.gain,
+        least(m.delay == Margins::kMostDelay), m.delay);
   }
   return app::kDone;
 }
@@ -51,31 +53,31 @@ int showLoop(const Experiment& e) {
 struct Parameter {
   const char* name;
   const char* label;
-  double least;
+  double least, most;
   void (*set)(Loop& loop, const Loop& original, double value);
 };
 const Parameter kParameters[] = {
-    {"mass", "robot's inertia, times its own", 0.0,
+    {"mass", "robot's inertia, times its own", 0.0, 10000.0,
      [](Loop& l, const Loop& o, double v) {
        l.robot_P.mass = v * o.robot_P.mass;
        l.robot_P.I_Bcm_B = v * o.robot_P.I_Bcm_B;
      }},
-    {"rate", "controller rate [Hz]", 1.0,
+    {"rate", "controller rate [Hz]", 1.0, 1000.0,
      [](Loop& l, const Loop&, double v) { l.period = 1.0 / v; }},
-    {"K_P", "K_P, times its own", 0.0,
+    {"K_P", "K_P, times its own", 0.0, 100.0,
      [](Loop& l, const Loop& o, double v) { l.velocity_gain = v * o.velocity_gain; }},
-    {"delay", "further delay [ticks]", 0.0,
+    {"delay", "further delay [ticks]", 0.0, 50.0,
      [](Loop& l, const Loop& o, double v) { l.delay = o.delay + static_cast<int>(v); }},
-    {"filter", "cut-off of Filter 3 [rad/s]", 0.0,
+    {"filter", "cut-off of Filter 3 [rad/s]", 0.0, 10000.0,
      [](Loop& l, const Loop&, double v) { l.filter_cutoff = v; }},
-    {"sensor", "cut-off of the sensor's filter [Hz]", 0.1,
+    {"sensor", "cut-off of the sensor's filter [Hz]", 0.1, 10000.0,
      [](Loop& l, const Loop&, double v) { l.sensor_cutoff = 2.0 * M_PI * v; }},
-    {"frequency", "frequencies of the base, times their own", 0.0,
+    {"frequency", "frequencies of the base, times their own", 0.0, 1000.0,
      [](Loop& l, const Loop& o, double v) {
        l.base.stiffness = v * v * o.base.stiffness;
        l.base.damping = v * o.base.damping;
      }},
-    {"modes", "modes kept", 1.0,
+    {"modes", "modes kept", 1.0, 132.0,
      [](Loop& l, const Loop& o, double v) {
        l.base = softest(
            o.base, std::clamp(static_cast<int>(v), 1, static_cast<int>(o.base.stiffness.size())));
@@ -100,12 +102,13 @@ MapAxis axisOf(const std::string& option, const std::string& text) {
       equals != std::string::npos && colon != std::string::npos && colon > equals &&
       CLI::detail::lexical_cast(text.substr(equals + 1, colon - equals - 1), axis.from) &&
       CLI::detail::lexical_cast(text.substr(colon + 1), axis.to);
-  if (!axis.parameter || !numbers || !(axis.to > axis.from && axis.to < 1e6))
+  if (!axis.parameter || !numbers || !(axis.to > axis.from))
     throw InputError(fmt::format("{} '{}': want NAME=FROM:TO, FROM below TO, NAME one of {}",
                                  option, text, names));
-  if (!(axis.from >= axis.parameter->least))
-    throw InputError(fmt::format("{} '{}': want {} from {} up", option, text, axis.parameter->name,
-                                 axis.parameter->least));
+  if (!(axis.from >= axis.parameter->least && axis.to <= axis.parameter->most))
+    throw InputError(fmt::format("{} '{}': want {} within [{}, {}]", option, text,
+                                 axis.parameter->name, axis.parameter->least,
+                                 axis.parameter->most));
   return axis;
 }
 
@@ -229,7 +232,13 @@ int main(int argc, char** argv) {
       app::printWarnings(e);
       return showLoop(e);
     }
-    if (scenario.empty()) return drawPublished(makeFolder(out));
+    if (scenario.empty()) {
+      for (const char* option : {"--x", "--y", "--set"})
+        if (map->count(option))
+          throw InputError(
+              fmt::format("{}: of a scenario's map, and no scenario is given", option));
+      return drawPublished(makeFolder(out));
+    }
     const MapAxis of_x = axisOf("--x", x), of_y = axisOf("--y", y);
     options.scenario = scenario;
     return drawMap(options.load(), of_x, of_y, makeFolder(out));

@@ -274,7 +274,7 @@ const std::vector<std::string> kDiverging = {"base.keep_modes=6", "legs.filters=
 
 TEST(Gate, NamesWhatGrowsAndWhatItNamesCuresIt) {
   const Experiment e = test::experiment("srms_deploy_doss", kDiverging);
-  const Verdict v = judge(e.controller, e.plant);
+  const LoopVerdict v = judge(e.controller, e.plant);
   ASSERT_FALSE(v.stable);
   EXPECT_GT(v.worst.growth, 0.0);
   const std::string said = explain(v);
@@ -333,12 +333,60 @@ TEST(Gate, BarsAdmittanceControlUnlessForced) {
   EXPECT_TRUE(good.controller.admissible);
 }
 
-TEST(Gate, ProgramThatComesToItGoesHomeInstead) {
+TEST(Gate, ProgramThatHasItDoesNotBegin) {
   Experiment e = test::experiment("srms_deploy_doss", kDiverging);
   admit(e.controller, e.plant);
-  const RunResult result = runLockstep(e, nullptr, {});
-  EXPECT_TRUE(result.cut_short);
-  EXPECT_EQ(result.phase, Phase::kParked);
+  test::Rig rig(e);
+  rig.tick(Request::kStart);
+  EXPECT_EQ(rig.state().refusal, Refusal::kUnstable);
+  for (int i = 0; i < 100; ++i) rig.tick();
+  EXPECT_EQ(rig.state().phase, Phase::kDisarmed);
+  rig.arm();
+  rig.tick(Request::kStart);
+  EXPECT_EQ(rig.state().refusal, Refusal::kUnstable);
+  EXPECT_EQ(rig.state().phase, Phase::kArmed);
+}
+
+TEST(Gate, LooksAtThePosesBetweenTheEndsOfAMove) {
+  // Hanging to either side the arm is borne; swinging over from one to the other it stretches out.
+  const auto stable = [](const std::string& to) {
+    const Experiment e = test::experiment(
+        "doss_on_table_4_1",
+        {"legs.filters=outputs", "base.mass_diagonal=[500,500,500,25,500,500]",
+         "base.damping_diagonal=[500,500,500,20,250,250]",
+         "robot.joints_deg_or_m=[0,0,-180,0,0,0,0]", "gravity_m_per_s2=0",
+         "program=[{move: {}}, {admittance: {duration_s: 20}, robot: [{at_s: 1, duration_s: 15, "
+         "joint: joint_3, to_deg_or_m: " +
+             to + "}]}]"});
+    return judge(e.controller, e.plant, false).stable;
+  };
+  EXPECT_TRUE(stable("-180"));
+  EXPECT_FALSE(stable("0"));
+  EXPECT_FALSE(stable("-90"));
+}
+
+TEST(Gate, LetsAFreeBaseDriftAndStillNamesCures) {
+  const auto verdict = [](std::vector<std::string> sets) {
+    const Experiment e = test::experiment("puma_on_table_4_1", std::move(sets));
+    return judge(e.controller, e.plant);
+  };
+  EXPECT_TRUE(
+      verdict({"base.stiffness_diagonal=[0,0,0,0,0,0]", "base.damping_diagonal=[0,0,0,0,0,0]"})
+          .stable);
+  // Free in x alone, too light in the rest: fewer modes, weaker K_P or damping still cure it.
+  const LoopVerdict light = verdict({"base.mass_diagonal=[12,12,12,6,6,6]",
+                                     "base.stiffness_diagonal=[0,250,250,120,120,120]"});
+  EXPECT_FALSE(light.stable);
+  EXPECT_TRUE(light.stable_modes > 0 || light.damping_ratio > 0.0 || light.K_P > 0.0);
+}
+
+TEST(Margins, OfARobotWithoutMassAreTheMostThatIsLookedFor) {
+  const Experiment e = test::experiment("free_decay");
+  Loop loop = loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kExtending);
+  loop.robot_P = RigidBody{};
+  const Margins m = margins(loop);
+  EXPECT_EQ(m.gain, Margins::kMostGain);
+  EXPECT_EQ(m.delay, Margins::kMostDelay);
 }
 
 TEST(Gate, ScenariosOfTheRepositoryPass) {

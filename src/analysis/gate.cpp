@@ -3,79 +3,103 @@
 
 #include <fmt/format.h>
 
-#include <vector>
+#include <algorithm>
+#include <cmath>
 
 namespace ves {
 namespace {
 
 constexpr Direction kBoth[] = {Direction::kExtending, Direction::kRetracting};
 
-/// Joint poses that the program passes through.
-std::vector<JointVector> poses(const plant::PlantConfig& plant) {
-  std::vector<JointVector> out = {plant.initial_joints};
-  for (const plant::RobotEvent& event : plant.robot_events) {
-    JointVector q = out.back();
-    q(event.move.joint) = event.move.target;
-    out.push_back(q);
-  }
-  return out;
-}
-
 /// True when `change`d loops of all poses and directions decay.
 template <class Change>
 bool holds(const ControllerConfig& controller, const plant::PlantConfig& plant,
-           const Change& change) {
-  for (const JointVector& q : poses(plant))
+           const std::vector<JointVector>& poses, const Change& change) {
+  for (const JointVector& q : poses)
     for (const Direction direction : kBoth) {
       Loop loop = loopOf(controller, plant, q, direction);
       change(loop);
-      if (!(radius(loop) < 1.0)) return false;
+      if (!decays(loop)) return false;
     }
   return true;
 }
 
 }  // namespace
 
-Verdict judge(const ControllerConfig& controller, const plant::PlantConfig& plant, bool cures) {
-  Verdict out;
-  out.modes = static_cast<int>(controller.admittance.stiffness.size());
-  Loop worst;
-  double largest = 0.0;
-  for (const JointVector& q : poses(plant))
-    for (const Direction direction : kBoth) {
-      const Loop loop = loopOf(controller, plant, q, direction);
-      const double r = radius(loop);
-      if (r <= largest) continue;
-      largest = r;
-      worst = loop;
-      out.direction = direction;
+std::vector<JointVector> programPoses(const Program& program, const plant::PlantConfig& plant) {
+  constexpr int kLooks = 16;  // [-] along the motions of a segment
+  std::vector<JointVector> out = {plant.initial_joints};
+  JointVector at = plant.initial_joints;
+  for (int i = 0; i < program.size; ++i) {
+    const bool felt =
+        program.segments[static_cast<std::size_t>(i)].kind == SegmentKind::kAdmittance;
+    if (felt && at != out.back()) out.push_back(at);
+    std::vector<plant::RobotEvent> events;
+    for (const plant::RobotEvent& event : plant.robot_events)
+      if (event.cue.segment == i) events.push_back(event);
+    if (events.empty()) continue;
+    std::stable_sort(events.begin(), events.end(),
+                     [](const auto& a, const auto& b) { return a.cue.after < b.cue.after; });
+    const std::int64_t begin = events.front().cue.after;
+    std::int64_t end = begin;
+    for (const plant::RobotEvent& event : events)
+      end = std::max<std::int64_t>(end, event.cue.after + std::llround(event.move.duration * 1e9));
+    JointPaths paths(kMaxJoints, at);
+    auto next = events.begin();
+    for (int look = 1; look <= kLooks; ++look) {
+      const std::int64_t now = begin + (end - begin) / kLooks * look;
+      for (; next != events.end() && next->cue.after <= now; ++next)
+        paths.move(next->move, next->cue.after);
+      at = paths.at(look == kLooks ? end : now).q;
+      if (felt) out.push_back(at);
     }
-  // A base that is free in a direction has a root at one, and drifts as it should.
-  constexpr double kOne = 1.0 + 1e-7;
-  out.stable = largest <= kOne;
-  out.stable_modes = out.modes;
-  if (!cures) return out;
-  out.worst = slowest(worst);
-  if (out.stable) return out;
-
-  out.stable_modes = 0;
-  while (out.stable_modes < out.modes &&
-         holds(controller, plant, [&](Loop& l) { l.base = softest(l.base, out.stable_modes + 1); }))
-    ++out.stable_modes;
-  for (double zeta = 0.02; zeta <= 1.0 && out.damping_ratio == 0.0; zeta *= 1.25)
-    if (holds(controller, plant, [&](Loop& l) {
-          const Eigen::VectorXd c =
-              (2.0 * zeta * l.base.stiffness.cwiseSqrt()).cwiseMax(l.base.damping.diagonal());
-          l.base.damping = c.asDiagonal();
-        }))
-      out.damping_ratio = zeta;
-  for (const double share : {0.8, 0.6, 0.4, 0.25, 0.125})
-    if (out.K_P == 0.0 && holds(controller, plant, [&](Loop& l) { l.velocity_gain *= share; }))
-      out.K_P = share;
+  }
   return out;
 }
 
-std::string explain(const Verdict& v) {
+LoopVerdict judge(const ControllerConfig& controller, const plant::PlantConfig& plant, bool cures) {
+  LoopVerdict out;
+  out.modes = static_cast<int>(controller.admittance.stiffness.size());
+  out.stable_modes = out.modes;
+  const std::vector<JointVector> poses = programPoses(controller.program, plant);
+  double largest = 0.0;
+  for (const Direction direction : kBoth) {
+    double most = 0.0;
+    Loop& kept = direction == Direction::kExtending ? out.extending : out.retracting;
+    for (const JointVector& q : poses) {
+      const Loop loop = loopOf(controller, plant, q, direction);
+      if (!decays(loop)) out.stable = false;
+      if (!cures && !out.stable) return out;
+      const double r = radius(loop);
+      if (r <= most) continue;
+      most = r;
+      kept = loop;
+    }
+    if (most <= largest) continue;
+    largest = most;
+    out.direction = direction;
+  }
+  if (!cures) return out;
+  out.worst = slowest(out.direction == Direction::kExtending ? out.extending : out.retracting);
+  if (out.stable) return out;
+
+  const auto cured = [&](const auto& change) { return holds(controller, plant, poses, change); };
+  out.stable_modes = 0;
+  while (out.stable_modes < out.modes &&
+         cured([&](Loop& l) { l.base = softest(l.base, out.stable_modes + 1); }))
+    ++out.stable_modes;
+  for (double zeta = 0.02; zeta <= 1.0 && out.damping_ratio == 0.0; zeta *= 1.25)
+    if (cured([&](Loop& l) {
+          const Eigen::VectorXd c = 2.0 * zeta * l.base.stiffness.cwiseSqrt();
+          l.base.damping.diagonal() = c.cwiseMax(l.base.damping.diagonal());
+        }))
+      out.damping_ratio = zeta;
+  for (const double share : {0.8, 0.6, 0.4, 0.25, 0.125})
+    if (out.K_P == 0.0 && cured([&](Loop& l) { l.velocity_gain *= share; })) out.K_P = share;
+  return out;
+}
+
+std::string explain(const LoopVerdict& v) {
   static constexpr const char* kCoordinate[] = {"x", "y", "z", "alpha", "beta", "gamma"};
   Eigen::Index i = 0;
   v.worst.shape.cwiseAbs().maxCoeff(&i);
@@ -87,10 +111,9 @@ std::string explain(const Verdict& v) {
   if (v.K_P > 0.0) add(fmt::format("{:.0f} percent of K_P", 100.0 * v.K_P));
   if (cure.empty()) cure = "a lighter robot or a heavier base";
   return fmt::format(
-      "the loop of base, robot and machine would diverge: {:.2f} Hz, most in {}, {:.2g}-fold a "
-      "second "
-      "(legs {}). What cures it: {}",
-      v.worst.frequency, kCoordinate[i], std::exp(v.worst.growth),
+      "the loop of base, robot and machine would diverge: {:.2f} Hz, most in {}, doubling every "
+      "{:.2g} s (legs {}). What cures it: {}",
+      v.worst.frequency, kCoordinate[i], std::log(2.0) / v.worst.growth,
       v.direction == Direction::kExtending ? "extending" : "retracting", cure);
 }
 

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <complex>
 #include <unsupported/Eigen/MatrixFunctions>
-#include <utility>
 
 #include "ves/math/second_order.hpp"
 
@@ -197,6 +196,17 @@ Loop loopOf(const ControllerConfig& controller, const plant::PlantConfig& p, con
   return loop;
 }
 
+bool decays(const Loop& loop) {
+  constexpr double kRounding = 1e-7;  // a free direction has a double root at one
+  constexpr double kDriftRate = 2.0 * M_PI * 0.01, kDriftGrowth = 0.02;  // [rad/s], [1/s]
+  const Eigen::VectorXcd roots = Eigen::EigenSolver<MatrixXd>(systemOf(loop), false).eigenvalues();
+  return std::all_of(roots.begin(), roots.end(), [&](const std::complex<double>& root) {
+    if (std::abs(root) <= 1.0 + kRounding) return true;
+    return std::abs(std::arg(root)) < kDriftRate * loop.period &&
+           std::abs(root) < 1.0 + kDriftGrowth * loop.period;
+  });
+}
+
 double radius(const Loop& loop) { return std::abs(largestRoot(systemOf(loop))); }
 
 Slowest slowest(const Loop& loop) {
@@ -223,23 +233,23 @@ Slowest slowest(const Loop& loop) {
 
 Margins margins(const Loop& loop) {
   Margins out;
-  Loop some = loop;
-  const auto stable = [&] { return radius(some) < 1.0; };
-  const auto heavier = [&](double factor) {
-    some.robot_P.mass = factor * loop.robot_P.mass;
-    some.robot_P.I_Bcm_B = factor * loop.robot_P.I_Bcm_B;
-    return stable();
+  const auto bears = [&](double factor) {
+    Loop some = loop;
+    some.robot_P.mass *= factor;
+    some.robot_P.I_Bcm_B *= factor;
+    return decays(some);
   };
   double lo = 1.0, hi = 1.0;
-  while (hi < Margins::kMostGain && heavier(hi)) lo = std::exchange(hi, 1.25 * hi);
-  for (int i = 0; i < 12 && hi < Margins::kMostGain; ++i) {
+  while (lo < Margins::kMostGain && bears(hi = std::min(1.25 * lo, Margins::kMostGain))) lo = hi;
+  for (int i = 0; i < 12 && lo < Margins::kMostGain; ++i) {
     const double mid = std::sqrt(lo * hi);
-    (heavier(mid) ? lo : hi) = mid;
+    (bears(mid) ? lo : hi) = mid;
   }
-  out.gain = std::min(lo, Margins::kMostGain);
-  some = loop;
-  while (out.delay < Margins::kMostDelay && (some.delay = loop.delay + out.delay + 1, stable()))
-    ++out.delay;
+  out.gain = lo;
+  for (Loop some = loop; out.delay < Margins::kMostDelay; ++out.delay) {
+    ++some.delay;
+    if (!decays(some)) break;
+  }
   return out;
 }
 
@@ -254,7 +264,7 @@ int stableModes(const ControllerConfig& controller, const plant::PlantConfig& pl
     for (const Direction direction : {Direction::kExtending, Direction::kRetracting}) {
       Loop loop = loopOf(controller, plant, q, direction);
       loop.base = softest(loop.base, k);
-      if (!(radius(loop) < 1.0)) return k - 1;
+      if (!decays(loop)) return k - 1;
     }
   return all;
 }

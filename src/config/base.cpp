@@ -4,12 +4,17 @@
 #include <fmt/format.h>
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <set>
 
 namespace ves {
 namespace {
 
 constexpr double kAny = HUGE_VAL;
+constexpr double kMostShape = 1e3;  // [1/sqrt(kg)], [1/sqrt(kg) rad/m]: a mass of a milligram
+constexpr int kMostDofs = 600;      // [-] of an arm
 
 /// What is wrong with a matrix that should be symmetric and positive definite (or semidefinite);
 /// empty when nothing is.
@@ -58,6 +63,11 @@ int readKeep(Section& s, int all) {
   return all;
 }
 
+/// The first k modes.
+ModalModel keep(const ModalModel& all, int k) {
+  return {all.Phi.leftCols(k), all.stiffness.head(k), all.damping.topLeftCorner(k, k)};
+}
+
 /// Modes as NASTRAN prints them, the shapes already at the robot's foot.
 ModalModel readTable(Section s) {
   const Eigen::VectorXd omega = 2.0 * M_PI * s.vector("frequency_hz", -1, 0.0, 1e4);
@@ -70,15 +80,22 @@ ModalModel readTable(Section s) {
              fmt::format("mode {} has {}, want 1: mass-normalised shapes (divide the mode's shape "
                          "by the root of its generalised mass)",
                          i + 1, mass(i)));
-  Eigen::MatrixXd shapes = s.matrix("shapes", 6, all, -kAny, kAny);
+  Eigen::MatrixXd shapes = s.matrix("shapes", 6, all, -kMostShape, kMostShape);
+  for (int i = 0; i < all; ++i)
+    if (shapes.col(i).isZero(0.0))
+      s.fail("shapes", fmt::format("column {} is zero: that mode moves nothing here", i + 1));
   const Mat3 R_PA = readAxes(s).transpose();
   shapes.topRows<3>() = R_PA * shapes.topRows<3>();
   shapes.bottomRows<3>() = R_PA * shapes.bottomRows<3>();
   s.finish();
+  std::vector<int> softest_first(static_cast<std::size_t>(all));
+  std::iota(softest_first.begin(), softest_first.end(), 0);
+  std::stable_sort(softest_first.begin(), softest_first.end(),
+                   [&](int a, int b) { return omega(a) < omega(b); });
   ModalModel out;
-  out.Phi = shapes;
-  out.stiffness = omega.cwiseAbs2();
-  out.damping = (2.0 * zeta.cwiseProduct(omega)).asDiagonal();
+  out.Phi = shapes(Eigen::all, softest_first);
+  out.stiffness = omega.cwiseAbs2()(softest_first);
+  out.damping = (2.0 * zeta.cwiseProduct(omega))(softest_first).asDiagonal();
   return out;
 }
 
@@ -110,6 +127,8 @@ ArmJoint readJoint(Section s, Section& pose) {
   joint.axis.normalize();
   joint.stiffness = s.number("stiffness_nm_per_rad", 1e-3, 1e12);
   const Eigen::VectorXd range = s.vector("range_deg", 2, -1e4, 1e4);
+  if (!(range(0) <= range(1)))
+    s.fail("range_deg", fmt::format("[{}, {}], want lower <= upper", range(0), range(1)));
   joint.angle = pose.number(joint.name, range(0), range(1)) * kDegree;
   s.finish();
   return joint;
@@ -136,18 +155,28 @@ ArmDescription readArm(Section& s) {
   arm.damping_ratio = s.number("damping_ratio", 0.0, 1e3);
   arm.R_TP = readAxes(s);
   Section pose = s.section("pose_deg");
-  for (Section part : s.list("chain")) {
+  const std::vector<Section> parts = s.list("chain");
+  if (parts.empty()) s.fail("chain", "has no parts");
+  std::set<std::string> names;
+  int dofs = 0;
+  for (Section part : parts) {
     const std::string kind = part.onlyKey({"joint", "beam", "housing"}, {});
-    if (kind == "joint")
-      arm.chain.push_back(readJoint(part.section("joint"), pose));
-    else if (kind == "beam")
-      arm.chain.push_back(readBeam(part.section("beam")));
-    else
+    if (kind == "joint") {
+      const ArmJoint joint = readJoint(part.section("joint"), pose);
+      if (!names.insert(joint.name).second)
+        part.fail("joint.name", fmt::format("'{}' is the name of another joint too", joint.name));
+      arm.chain.push_back(joint);
+    } else if (kind == "beam") {
+      const ArmBeam beam = readBeam(part.section("beam"));
+      if ((dofs += 6 * beam.elements) > kMostDofs)
+        part.fail("beam.elements", fmt::format("{} degrees of freedom up to here, want at most {}",
+                                               dofs, kMostDofs));
+      arm.chain.push_back(beam);
+    } else
       arm.chain.push_back(ArmHousing{readBody(part.section("housing"))});
     part.finish();
   }
   pose.finish();
-  if (arm.chain.empty()) s.fail("chain", "has no parts");
   if (s.has("payload")) arm.payload_P = readBody(s.section("payload"));
   return arm;
 }
@@ -172,15 +201,12 @@ Base readBase(Section s) {
     }
   } else if (s.has("modes")) {
     out.modes = readTable(s.section("modes"));
-    const int keep = readKeep(s, static_cast<int>(out.modes.stiffness.size()));
-    out.modes.Phi = out.modes.Phi.leftCols(keep).eval();
-    out.modes.stiffness = out.modes.stiffness.head(keep).eval();
-    out.modes.damping = out.modes.damping.topLeftCorner(keep, keep).eval();
+    out.modes = keep(out.modes, readKeep(s, static_cast<int>(out.modes.stiffness.size())));
   } else {
     const Mat6 M = readMatrix(s, "mass", false);
     const Mat6 C = readMatrix(s, "damping", true);
     const Mat6 K = readMatrix(s, "stiffness", true);
-    out.modes = modesOf(M, C, K);
+    out.modes = keep(modesOf(M, C, K), readKeep(s, 6));
   }
   s.finish();
   return out;

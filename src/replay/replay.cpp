@@ -144,7 +144,8 @@ class Replayer {
     const Experiment recorded = parseExperiment(m.resolved, log_ + ":configuration");
     const Experiment& used = options_.with ? *options_.with : recorded;
     ControllerConfig config = used.controller;
-    admit(config, used.plant);
+    const std::string why = admit(config, used.plant);
+    if (!config.admissible) result_.barred = why;
     period_ = config.period;
     platform_ = std::make_unique<TestPlatform>(config);
   }

@@ -129,7 +129,7 @@ class Reproduction {
       numbers_["sensor_noise"][fmt::format("{}_max_{}", kWrench[i], i < 3 ? "n" : "nm")] = peak(i);
     }
     const bool agrees =
-        peak(0) < 1.0 && peak(1) < 1.0 && peak(2) <= 3.5 && peak.tail<3>().maxCoeff() < 1.0;
+        peak(0) < 1.0 && peak(1) < 1.0 && peak(2) <= 3.0 && peak.tail<3>().maxCoeff() < 1.0;
     page_.claim({"4.1.1, figure 4.1",
                  "X and Y force under 1.0 N, Z spikes up to 3.0 N, moments under 1.0 N m",
                  fmt::format("X {:.2f} N, Y {:.2f} N, Z {:.2f} N; moments {:.2f} N m", peak(0),
@@ -337,13 +337,14 @@ class Reproduction {
     const bool near =
         std::abs(extending / 35.7e-3 - 1.0) < 0.1 && std::abs(retracting / 53.7e-3 - 1.0) < 0.1;
     page_.claim(
-        {"4.2.1, figures 4.4 and 4.5",
-         "z +-0.2 m at 0.5 Hz: the platform lags; the hardware's error is larger than the "
-         "simulation's",
-         fmt::format("{} mm extending, {} mm retracting", mm(extending), mm(retracting)),
+        {"4.2.1, figures 4.4 and 4.5", "z +-0.2 m at 0.5 Hz: the platform lags behind the command",
+         fmt::format("by up to {} mm extending, {} mm retracting", mm(extending), mm(retracting)),
          near ? Verdict::kAgrees : Verdict::kDiffers,
-         "with the lag: the servo's gains alone give 35.7 and 53.7 mm, half a period of the "
-         "100 Hz hold the rest. The hardware's error is in a figure only."});
+         "within a tenth of what the report's gains give a linear servo, 35.7 and 53.7 mm; half a "
+         "period of the 100 Hz hold is most of the rest"});
+    page_.claim({"4.2.1, figure 4.5", "the hardware's error in z is larger than the simulation's",
+                 fmt::format("{} and {} mm", mm(extending), mm(retracting)), Verdict::kCannotTell,
+                 "the hardware's error is in a figure only"});
     auto panels = tracking(z.series, SegmentKind::kTrajectory, {2});
     const auto error = [](int i) {
       return [i](const Row& r) { return (r.state.x_due[i] - r.truth.x[i]) * shown(i); };
@@ -539,13 +540,14 @@ class Reproduction {
          "the softest mode, and the legs' counts: one is 0.07 mm, the motion 0.3 to 0.7 mm. "
          "How far the real arm would have moved decides, and its poses and stiffness are "
          "substitutes"});
-    page_.claim(
-        {"4.3, figures 4.19 to 4.26", "DOSS: end effector motion of the order of centimetres",
-         fmt::format("{:.1f} to {:.1f} cm, by configuration and stiffness", 100.0 * smallest_doss,
-                     100.0 * largest_doss),
-         Verdict::kCannotTell,
-         "the arm's stiffness and poses and the DOSS's lengths are substitutes; with them it "
-         "does"});
+    page_.claim({"4.3, figures 4.19 to 4.26",
+                 "DOSS: end effector motion of the order of centimetres",
+                 fmt::format("{:.1f} to {:.1f} cm, by configuration and stiffness",
+                             100.0 * smallest_doss, 100.0 * largest_doss),
+                 Verdict::kCannotTell,
+                 "the arm's stiffness and poses and the DOSS's lengths are substitutes; the lower "
+                 "number is "
+                 "of the stiffness as estimated, the upper of half of it"});
     page_.claim({"5", "the end effector is displaced by no more than 2 cm in the worst case",
                  fmt::format("{:.1f} cm with stiffness_scale 1, {:.1f} cm with 0.5",
                              100.0 * largest, 100.0 * largest_half),

@@ -4,29 +4,36 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "ves/analysis/loop.hpp"
 
 namespace ves {
 
-/// The loop of an experiment at its worst: the gain of either direction, the robot at its first
-/// pose and at each that its program brings it to.
-struct Verdict {
+/// The loop of an experiment at its worst: the gain of either direction, the robot in each of
+/// programPoses().
+struct LoopVerdict {
   bool stable = true;
   Slowest worst;
   Direction direction = Direction::kExtending;
-  int modes = 0;             // [-] kept
-  int stable_modes = 0;      // [-] that could be
-  double damping_ratio = 0;  // [-] that every mode would need; 0: none up to 1 helps
-  double K_P = 0;            // [-] share of K_P that would do; 0: none from 1/8 to 1
+  Loop extending, retracting;  // in the pose where each is worst
+  int modes = 0;               // [-] kept
+  int stable_modes = 0;        // [-] that could be
+  double damping_ratio = 0;    // [-] that every mode would need; 0: none up to 1 helps
+  double K_P = 0;              // [-] share of K_P that would do; 0: none from 1/8 to 1
 };
 
+/// The robot's poses in admittance control: where the program begins, and all along each motion of
+/// its admittance segments. Motions ordered by hand are not known beforehand; the oscillation
+/// monitor looks at those.
+std::vector<JointVector> programPoses(const Program& program, const plant::PlantConfig& plant);
+
 /// Without `cures`: only whether it is stable.
-Verdict judge(const ControllerConfig& controller, const plant::PlantConfig& plant,
-              bool cures = true);
+LoopVerdict judge(const ControllerConfig& controller, const plant::PlantConfig& plant,
+                  bool cures = true);
 
 /// In one line: what grows, how fast, and what would cure it.
-std::string explain(const Verdict& verdict);
+std::string explain(const LoopVerdict& verdict);
 
 /// Judges, and bars admittance control (ControllerConfig::admissible) when it would diverge, unless
 /// it is forced. The explanation then; empty when all is well.

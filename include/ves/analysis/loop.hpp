@@ -55,11 +55,15 @@ Slowest slowest(const Loop& loop);
 /// Without the shape, which costs more than the root.
 double radius(const Loop& loop);
 
+/// No root outside the unit circle. A base that is free in a direction drifts, and a robot on it
+/// may turn drift (below 0.01 Hz) into a growth that takes minutes: that is let pass, up to 0.02/s.
+bool decays(const Loop& loop);
+
 /// Factor on the robot's inertia that the loop bears, and ticks of further delay; from a stable
 /// loop.
 struct Margins {
-  double gain = 0.0;  // [-] at most kMostGain
-  int delay = 0;      // [ticks] at most kMostDelay
+  double gain = 0.0;  // [-] kMostGain: at least
+  int delay = 0;      // [ticks] kMostDelay: at least
   static constexpr double kMostGain = 64.0;
   static constexpr int kMostDelay = 50;
 };

@@ -8,8 +8,7 @@
 //           robot's mass on the moving one. Small angles; of the base's rates only the centripetal
 //           term is kept.
 //   whole   Newton-Euler of the moving robot on the moving base, nothing left out. Phi_l eta' is
-//   the
-//           base's angular velocity, and its attitude is integrated beside the modes.
+//           the base's angular velocity, and its attitude is integrated beside the modes.
 #pragma once
 
 #include <cstdint>
