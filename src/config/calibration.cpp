@@ -40,14 +40,18 @@ std::string write(const CalibrationRecord& r) {
       list(r.standard_error));
 }
 
-CalibrationRecord readCalibration(Section s) {
-  CalibrationRecord r;
+std::int64_t readDate(Section& s) {
   const std::string date = s.text("date");
   tm utc{};
   const char* end = strptime(date.c_str(), "%Y-%m-%dT%H:%M:%SZ", &utc);
   if (!end || *end != 0)
     s.fail("date", fmt::format("'{}', want a date like 2026-11-21T07:40:12Z", date));
-  r.date = timegm(&utc);
+  return timegm(&utc);
+}
+
+CalibrationRecord readCalibration(Section s) {
+  CalibrationRecord r;
+  r.date = readDate(s);
   r.setup = s.text("setup");
   r.temperature = s.number("temperature_c", -273.15, 200.0);
   constexpr double kFullScale = 32768.0;

@@ -265,6 +265,12 @@ void override(Value& document, const std::string& assignment) {
   merge(document, std::move(leaf));
 }
 
+std::string fingerprint(const std::string& text) {
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  for (const unsigned char c : text) hash = (hash ^ c) * 0x100000001b3u;
+  return fmt::format("{:016x}", hash);
+}
+
 std::string emit(const Value& document) {
   YAML::Emitter out;
   emit(out, document);

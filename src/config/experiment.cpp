@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "ves/config/base.hpp"
+#include "ves/config/masses.hpp"
 #include "ves/config/urdf.hpp"
 
 namespace ves {
@@ -350,17 +351,10 @@ int countSubstitutes(const Value& value, bool inherited) {
   return count;
 }
 
-/// FNV-1a, 64 bits: tells configurations apart, no more.
-std::string fingerprint(const std::string& text) {
-  std::uint64_t hash = 0xcbf29ce484222325u;
-  for (const unsigned char c : text) hash = (hash ^ c) * 0x100000001b3u;
-  return fmt::format("{:016x}", hash);
-}
-
 /// What a calibration depends on.
 std::string setupOf(const Value& document) {
   std::string text;
-  for (const char* key : {"sensor", "robot", "gravity_m_per_s2"})
+  for (const char* key : {"sensor", "robot", "gravity_m_per_s2", "masses"})
     if (const Value* value = document.find(key)) text += emit(*value);
   return fingerprint(text);
 }
@@ -462,6 +456,17 @@ Experiment build(const Value& document) {
     c.bias = out.calibration->bias;
   }
 
+  if (root.has("masses")) {
+    Section section = root.section("masses");
+    const MassRecord masses = readMasses(section);
+    if (masses.kinematics != kinematicsOf(c.payload) ||
+        std::ssize(masses.bodies) != c.payload.robot.joints + 1)
+      section.fail("kinematics", fmt::format("{} is of another robot, mount or sensor, want {}; "
+                                             "identify again",
+                                             masses.kinematics, kinematicsOf(c.payload)));
+    c.payload = withMasses(c.payload, masses);
+  }
+
   ProgramReader(has_robot ? &urdf : nullptr, out).read(root);
   root.finish();
   out.substitutes = countSubstitutes(document, false);
@@ -474,9 +479,11 @@ Experiment build(const Value& document) {
 
 Experiment loadExperiment(const std::filesystem::path& file,
                           const std::vector<std::string>& overrides,
-                          const std::filesystem::path& calibration) {
+                          const std::filesystem::path& calibration,
+                          const std::filesystem::path& masses) {
   Value document = loadDocument(file);
   if (!calibration.empty()) document.put("calibration", loadDocument(calibration));
+  if (!masses.empty()) document.put("masses", loadDocument(masses));
   for (const std::string& assignment : overrides) override(document, assignment);
   return build(document);
 }

@@ -32,6 +32,9 @@ CalibrationRecord readCalibration(Section section);
 /// "2026-11-21T07:40:12Z"
 std::string dateText(std::int64_t seconds);
 
+/// The section's `date`, written so. [s] since 1970, UTC. Throws InputError.
+std::int64_t readDate(Section& section);
+
 /// [h] from the record to now, by this machine's clock.
 double age(const CalibrationRecord& record);
 

@@ -61,6 +61,9 @@ void override(Value& document, const std::string& assignment);
 std::filesystem::path findFile(const std::string& kind, const std::string& name,
                                const std::filesystem::path& folder);
 
+/// Tells texts apart, no more: FNV-1a, 64 bits, in hexadecimal.
+std::string fingerprint(const std::string& text);
+
 /// YAML that parseDocument() reads back to the same document.
 std::string emit(const Value& document);
 

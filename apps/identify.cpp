@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// ves identify: what the machine can find out about itself.
+#include <ctime>
+
+#include "runner.hpp"
+#include "ves/config/masses.hpp"
+#include "ves/identification/scenario.hpp"
+#include "ves/report/rests.hpp"
+
+namespace {
+
+using namespace ves;
+
+constexpr const char* kChannel[] = {"Fx", "Fy", "Fz", "Mx", "My", "Mz"};
+
+/// Turns what a computation cannot do into a line for a person.
+template <class F>
+auto orRefuse(const std::string& about, const F& f) {
+  try {
+    return f();
+  } catch (const std::domain_error& error) {
+    throw InputError(fmt::format("{}: {}", about, error.what()));
+  }
+}
+
+int plan(const std::string& scenario, const PosePlanOptions& options, double speed,
+         std::string file) {
+  const std::filesystem::path base = findScenario(scenario, app::configFolder());
+  const Experiment e = loadExperiment(base);
+  app::printWarnings(e);
+  if (e.joint_names.empty())
+    throw InputError(fmt::format("{}: has no robot with joints to identify", base.string()));
+  if (!(e.controller.gravity.norm() > 0.0))
+    throw InputError(fmt::format("{}: gravity_m_per_s2: 0, want weight to feel", base.string()));
+  const std::string name = "identify_" + e.name;
+  if (file.empty()) file = (makeFolder("ves-runs") / (name + ".yaml")).string();
+  const SeparableCombinations combinations =
+      orRefuse(base.string(), [&] { return separableCombinations(e.controller.payload.robot); });
+  const PosePlan plan = orRefuse(base.string(), [&] {
+    return planPoses(staticSetup(e.controller), combinations, e.controller, e.plant.initial_joints,
+                     options);
+  });
+  const std::filesystem::path folder = std::filesystem::absolute(file).parent_path();
+  const std::string from =
+      std::filesystem::proximate(std::filesystem::absolute(base), folder).string();
+  app::writeFile(file, scenarioOf(plan, e, name, from, speed));
+  loadExperiment(file);  // what is refused is refused now
+  fmt::print(
+      "{} of {} parameters can be told apart; condition number {:.1f}, of random poses "
+      "{:.1f}\n{}\n",
+      combinations.rank(), combinations.C.cols(), plan.condition, plan.condition_random, file);
+  return app::kDone;
+}
+
+std::vector<Rest> restsIn(const Series& series, const std::string& log) {
+  std::vector<Rest> rests = restsOf(series);
+  if (rests.empty())
+    throw InputError(fmt::format("{}: platform and robot never stand still for a second", log));
+  return rests;
+}
+
+int masses(const std::string& log, const std::string& file) {
+  const Series series = readSeries(log);
+  const Experiment& e = series.experiment;
+  const std::vector<Rest> rests = restsIn(series, log);
+  const StaticSetup setup = staticSetup(e.controller);
+  const SeparableCombinations combinations =
+      orRefuse(log, [&] { return separableCombinations(setup.robot); });
+  const MassEstimate m = orRefuse(log, [&] { return estimateMasses(setup, combinations, rests); });
+
+  std::string text = fmt::format(
+      "Mass parameters of the robot of '{}' from {} poses at rest, by ves identify.\n"
+      "{} of {} can be told apart (lengths in m, each link in its own frame, all plates counted\n"
+      "into link 0):\n\n",
+      e.name, rests.size(), combinations.rank(), combinations.C.cols());
+  int mixed = 0;
+  for (Eigen::Index i = 0; i < combinations.rank(); ++i) {
+    const bool poor = m.inflation(i) > MassEstimate::kMixed;
+    mixed += poor;
+    text += fmt::format("{:>11.4f} +- {:<8.4f} {:<5} {}{}\n", m.beta(i), m.standard_deviation(i),
+                        combinations.leads[static_cast<std::size_t>(i)] % 4 ? "kg m" : "kg",
+                        combinations.names[static_cast<std::size_t>(i)],
+                        poor ? "  (poorly observed)" : "");
+  }
+  text += fmt::format("\nchannel    bias [count]  drift [count/h]  residual [count]\n");
+  for (int c = 0; c < 6; ++c)
+    text += fmt::format("{:<8}{:>15.2f}{:>17.2f}{:>18.2f}\n", kChannel[c], m.bias(c),
+                        m.bias_drift(c) * 3600.0, m.residual(c));
+  text += fmt::format("condition number {:.1f}\n", m.condition);
+  fmt::print("{}", text);
+  if (mixed > 0)
+    fmt::print(
+        "{} poorly observed: these poses mix it with others, more than {:.0f} times the "
+        "deviation it could have\n",
+        mixed, MassEstimate::kMixed);
+  if (file.empty()) return app::kDone;
+
+  const Eigen::VectorXd full = completed(combinations, m.beta, massParameters(setup.robot));
+  MassRecord record;
+  record.date = std::time(nullptr);
+  record.kinematics = kinematicsOf(e.controller.payload);
+  for (Eigen::Index i = 0; i < full.size(); i += 4)
+    record.bodies.push_back({full(i), full.segment<3>(i + 1)});
+  app::writeFile(file, write(record, text + "\nBelow: one set of masses that has all of these. "
+                                            "Single values mean little."));
+  const Value written = loadDocument(file);
+  readMasses(Section(written, ""));  // a mass below zero would be refused
+  fmt::print("{}\n", file);
+  return app::kDone;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  using namespace ves;
+  CLI::App cli("What the machine finds out about itself.", "ves identify");
+  cli.require_subcommand(1);
+  std::string name, file;
+  PosePlanOptions options;
+  double tilt = options.tilt / kDegree, speed = 30.0;
+  CLI::App* of_plan = cli.add_subcommand(
+      "plan", "poses from which a scenario's robot is well identified, as a scenario to run");
+  of_plan->add_option("scenario", name, "name in config/scenarios, or a .yaml file")->required();
+  of_plan->add_option("--attitudes", options.attitudes, "of the platform")
+      ->check(CLI::Range(1, kMaxSegments / 3))
+      ->capture_default_str();
+  of_plan->add_option("--poses", options.poses, "of the robot in each attitude")
+      ->check(CLI::Range(1, 20))
+      ->capture_default_str();
+  of_plan->add_option("--tilt", tilt, "most about x and about y [deg]")
+      ->check(app::inRange(0.1, 85.0))
+      ->capture_default_str();
+  of_plan->add_option("--joint-speed", speed, "mean, of the robot's joints [deg/s | cm/s]")
+      ->check(app::inRange(0.1, 1000.0))
+      ->capture_default_str();
+  of_plan->add_option("--seed", options.seed, "of the search");
+  of_plan->add_option("--out", file, "scenario file; ves-runs/identify_SCENARIO.yaml by default");
+  CLI::App* of_masses = cli.add_subcommand(
+      "masses", "mass parameters from a log in which platform and robot stand still in many poses");
+  of_masses->add_option("log", name, "LCM event log of a run")->required();
+  of_masses->add_option("--out", file, "file for --masses of run, demo and controller");
+  return app::run(cli, argc, argv, [&] {
+    if (of_masses->parsed()) return masses(name, file);
+    options.tilt = tilt * kDegree;
+    return plan(name, options, speed, file);
+  });
+}

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// The file that an identification leaves: what gravity compensation uses instead of the masses of
+// the robot's URDF.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "ves/config/document.hpp"
+#include "ves/robot/payload.hpp"
+
+namespace ves {
+
+struct MassRecord {
+  std::int64_t date = 0;   // [s] since 1970, UTC
+  std::string kinematics;  // hash of the geometry it was taken with
+  struct Body {
+    double mass = 0.0;           // [kg]
+    Vec3 moment = Vec3::Zero();  // [kg m] about the origin of its frame
+  };
+  std::vector<Body> bodies;  // link 0, with all plates, then the links behind the joints
+};
+
+/// YAML, as readMasses() takes it; `comment` on top, its lines without #.
+std::string write(const MassRecord& record, const std::string& comment);
+
+/// Throws InputError.
+MassRecord readMasses(Section section);
+
+/// What a record depends on: where the sensor, the robot's base and its joints are.
+std::string kinematicsOf(const Payload& payload);
+
+/// The payload with these masses. As many bodies as it has links.
+Payload withMasses(Payload payload, const MassRecord& record);
+
+}  // namespace ves

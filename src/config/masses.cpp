@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/config/masses.hpp"
+
+#include <fmt/format.h>
+
+#include <sstream>
+
+#include "ves/config/calibration.hpp"
+
+namespace ves {
+
+std::string write(const MassRecord& r, const std::string& comment) {
+  std::string text;
+  std::istringstream lines(comment);
+  for (std::string line; std::getline(lines, line);)
+    text += line.empty() ? "#\n" : "# " + line + "\n";
+  text += fmt::format("date: {}\nkinematics: {}  # hash of the geometry it holds for\nbodies:\n",
+                      dateText(r.date), r.kinematics);
+  for (const MassRecord::Body& body : r.bodies)
+    text += fmt::format("  - {{mass_kg: {}, moment_kg_m: [{}, {}, {}]}}\n", body.mass,
+                        body.moment.x(), body.moment.y(), body.moment.z());
+  return text;
+}
+
+MassRecord readMasses(Section s) {
+  MassRecord r;
+  r.date = readDate(s);
+  r.kinematics = s.text("kinematics");
+  for (Section one : s.list("bodies")) {
+    MassRecord::Body body;
+    body.mass = one.number("mass_kg", 1e-6, 1e5);
+    body.moment = one.vector("moment_kg_m", 3, -1e6, 1e6);
+    one.finish();
+    r.bodies.push_back(body);
+  }
+  s.finish();
+  return r;
+}
+
+std::string kinematicsOf(const Payload& payload) {
+  std::string text;
+  const auto add = [&](const auto& numbers) {
+    for (const double x : numbers.reshaped()) text += fmt::format("{:.9g} ", x + 0.0);
+  };
+  const auto frame = [&](const Transform& X) {
+    add(X.R);
+    add(X.p);
+  };
+  frame(payload.X_PS);
+  frame(payload.X_PL0());
+  for (int i = 0; i < payload.robot.joints; ++i) {
+    const Link& link = payload.robot.link(i);
+    text += link.type == JointType::kRevolute ? "r " : "p ";
+    frame(link.X_parent);
+    add(link.axis);
+  }
+  return fingerprint(text);
+}
+
+Payload withMasses(Payload payload, const MassRecord& record) {
+  payload.top_plate_S = {};
+  payload.adapter_R = {};
+  for (std::size_t i = 0; i < record.bodies.size(); ++i) {
+    RigidBody& body = i == 0 ? payload.robot.base : payload.robot.links[i - 1].body;
+    body.mass = record.bodies[i].mass;
+    body.p_BoBcm_B = record.bodies[i].moment / body.mass;
+  }
+  return payload;
+}
+
+}  // namespace ves

@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/identification/pose_plan.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <stdexcept>
+
+namespace ves {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+class Planner {
+ public:
+  Planner(const StaticSetup& setup, const SeparableCombinations& combinations,
+          const ControllerConfig& controller, const JointVector& start,
+          const PosePlanOptions& options)
+      : setup_(setup),
+        combinations_(combinations),
+        controller_(controller),
+        axes_(controller.geometry),
+        masses_(massParameters(setup.robot)),
+        start_(start),
+        options_(options),
+        draw_(options.seed) {}
+
+  PosePlan plan() {
+    PosePlan out;
+    Stand at{Vec3::Zero(), start_};
+    for (int i = 0; i < options_.attitudes; ++i) {
+      PosePlan::Attitude a;
+      a.rpy = attitude();
+      for (int k = 0; k < options_.poses; ++k) {
+        a.q.push_back(pose(a.rpy, at));
+        at = {a.rpy, a.q.back()};
+      }
+      out.attitudes.push_back(a);
+    }
+    // Columns at their usual length.
+    MatrixXd information = of(out);
+    scale_ = information.diagonal().cwiseSqrt().cwiseInverse();
+    out.condition = out.condition_random = condition(information);
+    for (int i = 0; i < options_.exchanges; ++i) {
+      const std::size_t which = below(out.attitudes.size());
+      const PosePlan::Attitude old = out.attitudes[which];
+      PosePlan::Attitude changed = old;
+      if (i % (options_.poses + 1) == 0)
+        changed.rpy = attitude();
+      else
+        changed.q[below(changed.q.size())] = pose();
+      const MatrixXd next = information - of(old) + of(changed);
+      const double c = condition(next);
+      if (!(c < out.condition)) continue;
+      out.attitudes[which] = changed;
+      if (!passable(out, which)) {
+        out.attitudes[which] = old;
+        continue;
+      }
+      out.condition = c;
+      information = next;
+    }
+    return out;
+  }
+
+ private:
+  double uniform() { return static_cast<double>(draw_() >> 11) * 0x1p-53; }
+  std::size_t below(std::size_t n) {
+    return std::min(n - 1, static_cast<std::size_t>(uniform() * static_cast<double>(n)));
+  }
+  double between(double low, double high) { return low + (high - low) * uniform(); }
+
+  Vec3 attitude() {
+    for (int i = 0; i < kPatience; ++i) {
+      const Vec3 rpy(between(-options_.tilt, options_.tilt), between(-options_.tilt, options_.tilt),
+                     0.0);
+      const Pose x{Vec3::Zero(), rpy};
+      const Transform X_IP = controller_.geometry.fromHome(x);
+      const SafetyLimits& limits = controller_.safety;
+      if (motionLimitsCheck(limits, x) &&
+          actuatorLimitsCheck(limits, legLengths(controller_.geometry, X_IP)) &&
+          axes_.check(limits, controller_.geometry, X_IP) &&
+          collideCheck(limits, controller_.geometry, X_IP) &&
+          conditioningCheck(limits, controller_.geometry, X_IP))
+        return rpy;
+    }
+    throw std::domain_error("no attitude within this tilt keeps the safety limits");
+  }
+
+  JointVector pose() {
+    JointVector q = JointVector::Zero();
+    for (int k = 0; k < setup_.robot.joints; ++k) {
+      const Link& link = setup_.robot.link(k);
+      const double most = link.type == JointType::kRevolute ? M_PI : 1.0;
+      q(k) = between(std::max(link.lower, -most), std::min(link.upper, most));
+    }
+    return q;
+  }
+
+  struct Stand {
+    Vec3 rpy;
+    JointVector q;
+  };
+
+  JointVector pose(const Vec3& rpy, const Stand& from) {
+    for (int i = 0; i < kPatience; ++i) {
+      const Stand to{rpy, pose()};
+      if (borne(from, to)) return to.q;
+    }
+    throw std::domain_error("no pose of the robot keeps the sensor within its range");
+  }
+
+  /// The sensor bears the weight all the way.
+  bool borne(const Stand& from, const Stand& to) const {
+    constexpr double kMost = 0.8 * 32768.0;  // [count]
+    constexpr int kLooks = 8;
+    for (int i = 1; i <= kLooks; ++i) {
+      const double s = static_cast<double>(i) / kLooks;
+      const Vec6 counts =
+          countRegressor(setup_, from.q + s * (to.q - from.q), from.rpy + s * (to.rpy - from.rpy)) *
+          masses_;
+      if (!(counts.cwiseAbs().maxCoeff() < kMost)) return false;
+    }
+    return true;
+  }
+
+  /// From the attitude before `which`, through it, to the one after.
+  bool passable(const PosePlan& plan, std::size_t which) const {
+    Stand at{Vec3::Zero(), start_};
+    if (which > 0) at = {plan.attitudes[which - 1].rpy, plan.attitudes[which - 1].q.back()};
+    for (std::size_t i = which; i < std::min(which + 2, plan.attitudes.size()); ++i)
+      for (const JointVector& q : plan.attitudes[i].q) {
+        const Stand to{plan.attitudes[i].rpy, q};
+        if (!borne(at, to)) return false;
+        at = to;
+      }
+    return true;
+  }
+
+  /// Information on combinations and biases.
+  MatrixXd of(const PosePlan::Attitude& a) const {
+    const Eigen::Index r = combinations_.rank();
+    MatrixXd sum = MatrixXd::Zero(r + 6, r + 6), Y(6, r + 6);
+    Y.rightCols<6>().setIdentity();
+    for (const JointVector& q : a.q) {
+      Y.leftCols(r) = countRegressor(setup_, q, a.rpy)(Eigen::all, combinations_.leads);
+      sum += Y.transpose() * Y;
+    }
+    return sum;
+  }
+  MatrixXd of(const PosePlan& plan) const {
+    MatrixXd sum = MatrixXd::Zero(combinations_.rank() + 6, combinations_.rank() + 6);
+    for (const PosePlan::Attitude& a : plan.attitudes) sum += of(a);
+    return sum;
+  }
+  double condition(const MatrixXd& information) const {
+    const VectorXd values =
+        Eigen::SelfAdjointEigenSolver<MatrixXd>(
+            scale_.asDiagonal() * information * scale_.asDiagonal(), Eigen::EigenvaluesOnly)
+            .eigenvalues();
+    return values(0) > 0.0 ? std::sqrt(values(values.size() - 1) / values(0)) : HUGE_VAL;
+  }
+
+  static constexpr int kPatience = 10000;
+  const StaticSetup& setup_;
+  const SeparableCombinations& combinations_;
+  const ControllerConfig& controller_;
+  JointAxes axes_;
+  VectorXd masses_;
+  JointVector start_;
+  PosePlanOptions options_;
+  std::mt19937_64 draw_;
+  VectorXd scale_;
+};
+
+}  // namespace
+
+PosePlan planPoses(const StaticSetup& setup, const SeparableCombinations& combinations,
+                   const ControllerConfig& controller, const JointVector& start,
+                   const PosePlanOptions& options) {
+  return Planner(setup, combinations, controller, start, options).plan();
+}
+
+}  // namespace ves

@@ -1,0 +1,279 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Appendix B: what static wrenches tell of a robot's mass parameters.
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <random>
+
+#include "support/programs.hpp"
+#include "support/rig.hpp"
+#include "support/robots.hpp"
+#include "ves/config/masses.hpp"
+#include "ves/control/gravity_compensation.hpp"
+#include "ves/identification/scenario.hpp"
+#include "ves/plant/force_torque_sensor.hpp"
+
+namespace ves {
+namespace {
+
+using Eigen::VectorXd;
+
+Link joint(JointType type, const Vec3& axis, const Vec3& at) {
+  Link link;
+  link.type = type;
+  link.axis = axis;
+  link.X_parent.p = at;
+  link.body = {2.0, Vec3(0.1, -0.2, 0.3), Mat3::Identity()};
+  return link;
+}
+
+RobotModel chain(std::initializer_list<Link> links) {
+  RobotModel robot;
+  robot.base = {5.0, Vec3(0.0, 0.01, 0.2), Mat3::Identity()};
+  for (const Link& link : links) robot.links[static_cast<std::size_t>(robot.joints++)] = link;
+  return robot;
+}
+
+const Vec3 X = Vec3::UnitX(), Z = Vec3::UnitZ();
+
+JointVector anyPose(const RobotModel& robot, std::mt19937& draw) {
+  std::uniform_real_distribution<double> u(-2.0, 2.0);
+  JointVector q = JointVector::Zero();
+  for (int i = 0; i < robot.joints; ++i) q(i) = u(draw);
+  return q;
+}
+
+TEST(StaticRegressor, TimesTheParametersIsTheWrenchThatGravityCompensationSums) {
+  std::mt19937 draw(3);
+  std::uniform_real_distribution<double> u(-0.4, 0.4);
+  for (const char* name : {"puma_on_table_4_1", "doss_on_table_4_1"}) {
+    const Experiment e = test::experiment(name);
+    const StaticSetup setup = staticSetup(e.controller);
+    const VectorXd masses = massParameters(setup.robot);
+    for (int k = 0; k < 100; ++k) {
+      const JointVector q = anyPose(setup.robot, draw);
+      const Vec3 rpy(u(draw), u(draw), u(draw));
+      const Vec6 summed =
+          setup.S_proc * staticWrench(e.controller.payload, q, rotation(rpy), setup.g_I).stacked();
+      const Vec6 counts = countRegressor(setup, q, rpy) * masses;
+      EXPECT_LT((counts - summed).cwiseAbs().maxCoeff(), 1e-9 * summed.cwiseAbs().maxCoeff());
+    }
+  }
+}
+
+// Link 0 always gives four. Turning about an axis shows the first moment across it; what lies along
+// it, and the mass, pass to the link before. Sliding shows the mass alone.
+TEST(SeparableCombinations, RankIsWhatTheoryGives) {
+  const Vec3 p(0.3, 0.0, 0.5);
+  const auto rank = [](const RobotModel& robot) { return separableCombinations(robot).rank(); };
+  const auto R = JointType::kRevolute, P = JointType::kPrismatic;
+  EXPECT_EQ(rank(chain({})), 4);
+  EXPECT_EQ(rank(chain({joint(R, Z, p)})), 6);
+  EXPECT_EQ(rank(chain({joint(P, X, p)})), 5);
+  EXPECT_EQ(rank(chain({joint(R, Z, p), joint(R, Z, p)})), 8);
+  EXPECT_EQ(rank(chain({joint(R, Z, p), joint(R, X, p)})), 8);
+  EXPECT_EQ(rank(chain({joint(R, Z, p), joint(P, Z, p)})), 7);
+  EXPECT_EQ(rank(chain({joint(R, Z, p), joint(P, X, p)})), 7);
+  EXPECT_EQ(rank(test::robot("puma560").model), 4 + 2 * 6);
+  EXPECT_EQ(rank(test::robot("doss").model), 4 + 2 * 7);
+}
+
+TEST(SeparableCombinations, AreNamedAsOneWouldWriteThem) {
+  const RobotModel one = chain({joint(JointType::kRevolute, Z, Vec3(0.0, 0.0, 0.5))});
+  const std::vector<std::string> expected = {"m0 + m1", "m0 x0", "m0 y0", "m0 z0 + m1 z1 + 0.5 m1",
+                                             "m1 x1",   "m1 y1"};
+  EXPECT_EQ(separableCombinations(one).names, expected);
+  const RobotModel two = chain({joint(JointType::kRevolute, Z, Vec3::Zero()),
+                                joint(JointType::kRevolute, Z, Vec3(0.25, 0.0, 0.0))});
+  const std::vector<std::string> names = separableCombinations(two).names;
+  EXPECT_EQ(names[4], "m1 x1 + 0.25 m2");
+  EXPECT_EQ(names[3], "m0 z0 + m1 z1 + m2 z2");
+}
+
+TEST(SeparableCombinations, AnyParametersThatShareThemGiveTheSameWrench) {
+  std::mt19937 draw(5);
+  std::uniform_real_distribution<double> u(-0.4, 0.4);
+  for (const char* name : {"puma_on_table_4_1", "doss_on_table_4_1"}) {
+    const StaticSetup setup = staticSetup(test::experiment(name).controller);
+    const SeparableCombinations c = separableCombinations(setup.robot);
+    const VectorXd truth = massParameters(setup.robot);
+    for (const VectorXd& prior : {truth, VectorXd(VectorXd::Zero(truth.size()))}) {
+      const VectorXd other = completed(c, c.C * truth, prior);
+      for (int i = 0; i < other.size(); i += 4) EXPECT_GT(other(i), 0.0) << name << " body " << i;
+      for (int k = 0; k < 50; ++k) {
+        const JointVector q = anyPose(setup.robot, draw);
+        const auto Y = countRegressor(setup, q, Vec3(u(draw), u(draw), 0.0));
+        const Vec6 a = Y * truth, b = Y * other;
+        EXPECT_LT((a - b).cwiseAbs().maxCoeff(), 1e-8 * a.cwiseAbs().maxCoeff()) << name;
+      }
+    }
+  }
+}
+
+TEST(PosePlan, IsBetterThanChanceAndInsideTheLimits) {
+  const Experiment e = test::experiment("doss_on_table_4_1");
+  const StaticSetup setup = staticSetup(e.controller);
+  const SeparableCombinations c = separableCombinations(setup.robot);
+  const PosePlanOptions options;
+  const PosePlan plan = planPoses(setup, c, e.controller, e.plant.initial_joints, options);
+  EXPECT_LT(plan.condition, 0.8 * plan.condition_random);
+  ASSERT_EQ(plan.attitudes.size(), 16u);
+  for (const PosePlan::Attitude& a : plan.attitudes) {
+    EXPECT_LE(a.rpy.cwiseAbs().maxCoeff(), options.tilt);
+    ASSERT_EQ(a.q.size(), 3u);
+    for (const JointVector& q : a.q)
+      for (int i = 0; i < setup.robot.joints; ++i) {
+        EXPECT_GE(q(i), setup.robot.link(i).lower);
+        EXPECT_LE(q(i), setup.robot.link(i).upper);
+      }
+  }
+}
+
+/// Rests as the machine gives them: legs read in counts, a noisy, biased, drifting sensor.
+std::vector<Rest> readings(const Experiment& e, const StaticSetup& setup, const PosePlan& plan,
+                           std::uint32_t seed) {
+  constexpr int kSettling = 40, kReadings = 120;
+  plant::ForceTorqueSensor sensor(e.plant.sensor, plant::Noise(seed));
+  const auto step = sensor.prepare(0.01);
+  std::mt19937 draw(seed);
+  std::uniform_real_distribution<double> u(-0.5, 0.5);
+  std::vector<Rest> rests;
+  for (const PosePlan::Attitude& a : plan.attitudes)
+    for (const JointVector& q : a.q) {
+      Rest rest;
+      rest.t = 10.0 * static_cast<double>(rests.size());
+      rest.q = q;
+      const Transform X_IP = e.controller.geometry.fromHome({Vec3::Zero(), a.rpy});
+      // A leg rests anywhere within the count that it reads.
+      Vec6 L = legLengths(e.controller.geometry, X_IP);
+      L = legLengths(e.controller.legs, legCounts(e.controller.legs, L));
+      Vec6 truly = L;
+      for (int i = 0; i < kLegs; ++i) truly(i) += u(draw) * e.controller.legs.scale(i);
+      rest.rpy = e.controller.geometry.toHome(forwardPose(e.controller.geometry, L, X_IP).X_IP).rpy;
+      const Mat3 R = forwardPose(e.controller.geometry, truly, X_IP).X_IP.R;
+      const Wrench F = staticWrench(e.plant.payload, q, R, setup.g_I);
+      sensor.settle(F);
+      for (int k = 0; k < kSettling + kReadings; ++k) {
+        sensor.advance(step, F, plant::ForceTorqueSensor::Over::kConstant);
+        const AdcCounts adc = sensor.convert(1e-4 * rest.t);
+        if (k < kSettling) continue;
+        for (int i = 0; i < kWrenchChannels; ++i)
+          rest.counts(i) += adc[static_cast<std::size_t>(i)] / static_cast<double>(kReadings);
+      }
+      rests.push_back(rest);
+    }
+  return rests;
+}
+
+TEST(Identification, ParametersAreWithinThreeDeviationsInNinetyNinePercent) {
+  for (const char* name : {"puma_on_table_4_1", "doss_on_table_4_1"}) {
+    const Experiment e = test::experiment(name);
+    const StaticSetup setup = staticSetup(e.controller);
+    const SeparableCombinations c = separableCombinations(setup.robot);
+    const PosePlan plan = planPoses(setup, c, e.controller, e.plant.initial_joints, {});
+    const VectorXd truth = c.C * massParameters(setup.robot);
+    constexpr int kSeeds = 200;
+    int within = 0, of = 0;
+    double squares = 0.0;
+    for (int seed = 1; seed <= kSeeds; ++seed) {
+      const MassEstimate m =
+          estimateMasses(setup, c, readings(e, setup, plan, static_cast<std::uint32_t>(seed)));
+      const VectorXd z = (m.beta - truth).cwiseQuotient(m.standard_deviation);
+      within += static_cast<int>((z.array().abs() < 3.0).count());
+      of += static_cast<int>(z.size());
+      squares += z.squaredNorm();
+      EXPECT_LT(m.inflation.maxCoeff(), MassEstimate::kMixed);
+    }
+    EXPECT_GE(within, 0.99 * of) << name;
+    // Deviations that were too large would pass the first.
+    EXPECT_NEAR(std::sqrt(squares / of), 1.0, 0.15) << name;
+  }
+}
+
+TEST(Identification, SaysWhichParametersAreMixed) {
+  // One attitude tells the weight from the bias of Fz by nothing.
+  const Experiment e = test::experiment("puma_on_table_4_1");
+  const StaticSetup setup = staticSetup(e.controller);
+  const SeparableCombinations c = separableCombinations(setup.robot);
+  PosePlanOptions little;
+  little.tilt = 0.5 * kDegree;
+  const PosePlan plan = planPoses(setup, c, e.controller, e.plant.initial_joints, little);
+  const MassEstimate m = estimateMasses(setup, c, readings(e, setup, plan, 1));
+  EXPECT_GT(m.inflation(0), MassEstimate::kMixed);  // m0 + m1 + ..
+  EXPECT_LT(m.inflation(c.rank() - 1), MassEstimate::kMixed);
+}
+
+TEST(Identification, RefusesWhatCannotTell) {
+  const Experiment e = test::experiment("puma_on_table_4_1");
+  const StaticSetup setup = staticSetup(e.controller);
+  const SeparableCombinations c = separableCombinations(setup.robot);
+  EXPECT_THROW(estimateMasses(setup, c, std::vector<Rest>(3)), std::domain_error);
+  EXPECT_THROW(estimateMasses(setup, c, std::vector<Rest>(100)), std::domain_error);  // one pose
+}
+
+// --- As a person does it -------------------------------------------------------------------------
+
+class Identify : public test::Programs {
+ protected:
+  void expectRefusal(const std::string& command, const std::string& line) {
+    const test::Output out = test::sh(command);
+    EXPECT_EQ(out.status, 2) << command;
+    EXPECT_NE(out.text.find(line), std::string::npos) << out.text;
+  }
+  std::string file(const std::string& name) { return (folder_ / name).string(); }
+};
+
+TEST_F(Identify, PlanRunMassesAndTheirUse) {
+  for (const std::string scenario : {"puma_on_table_4_1", "doss_on_table_4_1"}) {
+    ASSERT_EQ(test::sh(app("identify") + "plan " + scenario + " --attitudes 7 " + "--out " +
+                       file("plan.yaml"))
+                  .status,
+              0);
+    ASSERT_EQ(run(file("plan.yaml") + " --lockstep --no-plots" + out("run")).status, 0);
+    const test::Output masses = test::sh(app("identify") + "masses " + file("run/run.lcmlog") +
+                                         " --out " + file("masses.yaml"));
+    ASSERT_EQ(masses.status, 0) << masses.text;
+
+    // Truth is in the plant; the controller has nothing but the file.
+    const Experiment e =
+        loadExperiment(std::string(VES_TEST_CONFIG_DIR) + "/scenarios/" + scenario + ".yaml", {},
+                       {}, file("masses.yaml"));
+    EXPECT_EQ(e.controller.payload.adapter_R.mass, 0.0);
+    EXPECT_GT(e.plant.payload.adapter_R.mass, 0.0);
+    std::mt19937 draw(7);
+    std::uniform_real_distribution<double> u(-0.3, 0.3);
+    for (int k = 0; k < 100; ++k) {  // fresh poses
+      const JointVector q = anyPose(e.plant.payload.robot, draw);
+      const Mat3 R = rotation(Vec3(u(draw), u(draw), 0.0));
+      const Vec6 residual = (staticWrench(e.controller.payload, q, R, e.controller.gravity) -
+                             staticWrench(e.plant.payload, q, R, e.controller.gravity))
+                                .stacked();
+      // The sensor's noise: about 0.3 N in x and y, 1 N in z, 0.1 N m.
+      EXPECT_LT(residual.head<3>().cwiseAbs().maxCoeff(), 0.1) << scenario;
+      EXPECT_LT(residual.tail<3>().cwiseAbs().maxCoeff(), 0.1) << scenario;
+    }
+    expectRefusal(app("run") + (scenario == "puma_on_table_4_1" ? "doss" : "puma") +
+                      "_on_table_4_1 --lockstep --masses " + file("masses.yaml") + out("x"),
+                  "masses.kinematics");
+  }
+}
+
+TEST_F(Identify, RefusesByName) {
+  expectRefusal(app("identify") + "plan free_decay", "has no robot with joints");
+  std::ofstream(file("space.yaml"))
+      << "from: " << VES_TEST_CONFIG_DIR << "/scenarios/puma_tilt.yaml\ngravity_m_per_s2: 0\n";
+  expectRefusal(app("identify") + "plan " + file("space.yaml"), "gravity_m_per_s2: 0");
+  expectRefusal(app("identify") + "plan puma_tilt --tilt nan", "--tilt");
+  expectRefusal(app("identify") + "masses " + file("no.lcmlog"), "no.lcmlog");
+  ASSERT_EQ(run("free_decay --lockstep --no-plots" + out("free")).status, 0);
+  expectRefusal(app("identify") + "masses " + file("free/run.lcmlog"), "never stand still");
+  std::ofstream(file("bad.yaml")) << "date: 2026-01-01T00:00:00Z\nkinematics: x\nbodies:\n"
+                                     "  - {mass_kg: -1, moment_kg_m: [0, 0, 0]}\n";
+  expectRefusal(app("run") + "puma_tilt --lockstep --masses " + file("bad.yaml") + out("y"),
+                "bodies[0].mass_kg");
+}
+
+}  // namespace
+}  // namespace ves
