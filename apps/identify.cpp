@@ -7,6 +7,7 @@
 #include "ves/config/masses.hpp"
 #include "ves/identification/scenario.hpp"
 #include "ves/report/rests.hpp"
+#include "ves/run/iterative_compensation.hpp"
 
 namespace {
 
@@ -110,6 +111,33 @@ int masses(const std::string& log, const std::string& file) {
   return app::kDone;
 }
 
+int iterate(const app::Options& load, const IterativeOptions& options, const std::string& file) {
+  const Experiment e = load.load();
+  app::printWarnings(e);
+  fmt::print("{:>9} {:>22} {:>22}\n", "iteration", "answer - path [mm]", "[deg]");
+  int n = 0;
+  const IterativeResult r = compensateIteratively(e, options, [&](const IterativeChange& change) {
+    fmt::print("{:>9} {:>22.3f} {:>22.4f}\n", ++n, change.translation * 1e3,
+               change.rotation / kDegree);
+    std::fflush(stdout);
+  });
+  fmt::print("{}, {:.0f} s of the machine's time\n",
+             r.converged ? fmt::format("converged after {} iterations", r.changes.size())
+             : r.stopped_by != Check::kCount
+                 ? fmt::format("stopped by the {} check", ves::name(r.stopped_by))
+                 : "not converged",
+             r.machine_time);
+  if (!file.empty()) {
+    std::string text = "rows_m_deg:  # x y z alpha beta gamma from home, a row a period\n";
+    for (const auto& x : r.path.colwise())
+      text += fmt::format("  - [{}, {}, {}, {}, {}, {}]\n", x(0), x(1), x(2), x(3) / kDegree,
+                          x(4) / kDegree, x(5) / kDegree);
+    app::writeFile(file, text);
+    fmt::print("{}\n", file);
+  }
+  return r.converged ? app::kDone : app::kTripped;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -140,7 +168,36 @@ int main(int argc, char** argv) {
       "masses", "mass parameters from a log in which platform and robot stand still in many poses");
   of_masses->add_option("log", name, "LCM event log of a run")->required();
   of_masses->add_option("--out", file, "file for --masses of run, demo and controller");
+  CLI::App* of_path = cli.add_subcommand(
+      "iterate",
+      "Kuklinski's compensation without a mass model: slow and fast passes of a scenario's robot "
+      "motion until the platform's path is the model's answer; the same motion every time");
+  app::Options load;
+  IterativeOptions iterative;
+  double millimetres = iterative.translation * 1e3, degrees = iterative.rotation / kDegree;
+  load.addExperiment(*of_path);
+  of_path->add_option("--slower", iterative.slower, "times, of a slow pass")
+      ->check(CLI::Range(2, 1000))
+      ->capture_default_str();
+  of_path->add_option("--weight", iterative.weight, "of the model's answer in the next path")
+      ->check(app::inRange(0.01, 1.0))
+      ->capture_default_str();
+  of_path->add_option("--most", iterative.most, "iterations")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  of_path->add_option("--tolerance-mm", millimetres, "answer less path")
+      ->check(app::inRange(1e-6, 1e3))
+      ->capture_default_str();
+  of_path->add_option("--tolerance-deg", degrees, "the same")
+      ->check(app::inRange(1e-6, 90.0))
+      ->capture_default_str();
+  of_path->add_option("--out", file, "file for the path, as a path segment takes it");
   return app::run(cli, argc, argv, [&] {
+    if (of_path->parsed()) {
+      iterative.translation = millimetres * 1e-3;
+      iterative.rotation = degrees * kDegree;
+      return iterate(load, iterative, file);
+    }
     if (of_masses->parsed()) return masses(name, file);
     options.tilt = tilt * kDegree;
     return plan(name, options, speed, file);

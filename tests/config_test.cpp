@@ -146,6 +146,37 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"payload_that_cannot_be", "srms_unberth_puma",
             "base.arm.payload={mass_kg: 50, inertia_kg_m2: [1, 1, -1, 0, 0, 0]}",
             "base.arm.payload.inertia_kg_m2: smallest principal moment -1"},
+        Bad{"modes_that_move_nothing", "z_sine",
+            "base={modes: {frequency_hz: [1, 2], damping_ratio: [0, 0], generalized_mass: [1, 1], "
+            "shapes: [[1, 0], [0, 0], [0, 0], [0, 0], [0, 0], [0, 0]]}}",
+            "base.modes.shapes: column 2 is zero"},
+        Bad{"range_backwards", "srms_unberth_puma",
+            "base={arm: {damping_ratio: 0, stiffness_scale: 1, pose_deg: {a: 0}, chain: [{joint: "
+            "{name: a, axis: [1, 0, 0], stiffness_nm_per_rad: 1, range_deg: [90, -90]}}]}}",
+            "range_deg: [90, -90], want lower <= upper"},
+        Bad{"one_name_for_two_joints", "srms_unberth_puma",
+            "base={arm: {damping_ratio: 0, stiffness_scale: 1, pose_deg: {a: 0}, chain: [{joint: "
+            "{name: a, axis: [1, 0, 0], stiffness_nm_per_rad: 1, range_deg: [-90, 90]}}, {joint: "
+            "{name: a, axis: [0, 1, 0], stiffness_nm_per_rad: 1, range_deg: [-90, 90]}}]}}",
+            "'a' is the name of another joint too"},
+        Bad{"too_many_elements", "srms_unberth_puma",
+            "base={arm: {damping_ratio: 0, stiffness_scale: 1, pose_deg: {}, chain: [{beam: {to_m: "
+            "[1, 0, 0], EI_n_m2: 1, GJ_n_m2: 1, EA_n: 1, mass_kg: 1, radius_m: 0, elements: 100}}, "
+            "{beam: {to_m: [1, 0, 0], EI_n_m2: 1, GJ_n_m2: 1, EA_n: 1, mass_kg: 1, radius_m: 0, "
+            "elements: 1}}]}}",
+            "606 degrees of freedom up to here, want at most 600"},
+        Bad{"path_of_five", "z_sine", "program=[{path: {rows_m_deg: [[0, 0, 0, 0, 0]]}}]",
+            "rows_m_deg[0]: has 5 entries, want 6"},
+        Bad{"path_of_nothing", "z_sine", "program=[{path: {rows_m_deg: []}}]",
+            "rows_m_deg: want one or more rows of 6 numbers"},
+        Bad{"two_paths", "z_sine",
+            "program=[{path: {rows_m_deg: [[0, 0, 0, 0, 0, 0]]}}, {path: {rows_m_deg: [[0, 0, 0, "
+            "0, 0, 0]]}}]",
+            "is the second path"},
+        Bad{"masses_of_another", "puma_tilt",
+            "masses={date: 2026-01-01T00:00:00Z, kinematics: 12, bodies: [{mass_kg: 1, "
+            "moment_kg_m: [0, 0, 0]}]}",
+            "masses.kinematics: 12 is of another robot"},
         Bad{"too_many_modes", "srms_unberth_puma", "base.keep_modes=133",
             "base.keep_modes: '133', want a whole number in [1, 132]"},
         Bad{"massless_part", "srms_unberth_puma",

@@ -14,6 +14,7 @@
 #include "ves/control/gravity_compensation.hpp"
 #include "ves/identification/scenario.hpp"
 #include "ves/plant/force_torque_sensor.hpp"
+#include "ves/run/iterative_compensation.hpp"
 
 namespace ves {
 namespace {
@@ -211,6 +212,83 @@ TEST(Identification, RefusesWhatCannotTell) {
   const SeparableCombinations c = separableCombinations(setup.robot);
   EXPECT_THROW(estimateMasses(setup, c, std::vector<Rest>(3)), std::domain_error);
   EXPECT_THROW(estimateMasses(setup, c, std::vector<Rest>(100)), std::domain_error);  // one pose
+}
+
+// --- Kuklinski's compensation --------------------------------------------------------------------
+
+const std::vector<std::string> kShort = {
+    "sensor.noise=false",
+    "program=[{move: {}}, {calibration: {}}, {move: {to: {x_m: 0.01}}}, {admittance: {duration_s: "
+    "5}, robot: [{at_s: 0.5, "
+    "duration_s: 2, joint: joint_1, to_deg_or_m: 30}]}]"};
+
+TEST(IterativeCompensation, EndsWhereCompensationWithKnownMassesIs) {
+  const Experiment e = test::experiment("puma_on_table_4_1", kShort);
+  IterativeOptions options;
+  options.weight = 1.0;
+  options.translation = 0.05e-3;
+  const IterativeResult r = compensateIteratively(e, options, {});
+  ASSERT_TRUE(r.converged);
+  for (std::size_t i = 1; i < r.changes.size(); ++i)
+    EXPECT_LT(r.changes[i].translation, r.changes[i - 1].translation);
+
+  RecordedPath online = r.path.col(0).replicate(1, r.path.cols());
+  Eigen::Index n = 0;
+  runLockstep(e, nullptr, [&](const TickState& state) {
+    if (state.kind == SegmentKind::kAdmittance && n + 1 < online.cols())
+      online.col(++n) = state.motion.x;
+    return Order();
+  });
+  ASSERT_EQ(n + 1, online.cols());
+  const double moved = online.topRows<3>().colwise().norm().maxCoeff();
+  EXPECT_GT(moved, 1e-3);
+  // Apart by the legs' counts (0.07 mm each), which both feel as weight that turns, and by a
+  // hundredth of the inertial forces in the slow passes.
+  EXPECT_LT((online - r.path).topRows<3>().colwise().norm().maxCoeff(), 0.03 * moved + 0.15e-3);
+}
+
+TEST(IterativeCompensation, DivergesOnALightlyDampedBase) {
+  // Mass ratio over twice the damping ratio is far above one; on line the same loop is stable.
+  const Experiment e = test::experiment("srms_low_hover_puma", {"sensor.noise=false"});
+  IterativeOptions options;
+  options.slower = 2;
+  options.most = 4;
+  const IterativeResult r = compensateIteratively(e, options, {});
+  EXPECT_FALSE(r.converged);
+  EXPECT_GT(r.changes.back().translation, 2.0 * r.changes.front().translation);
+}
+
+TEST(RecordedPath, IsGoneThroughColumnByColumnAndStandsAtItsEnds) {
+  constexpr double kPeriod = 0.01;
+  RecordedPath path(6, 200);
+  for (int i = 0; i < path.cols(); ++i)
+    for (int c = 0; c < 6; ++c) path(c, i) = 0.01 * (c + 1) * std::sin(2.0 * i * kPeriod);
+  for (int n = 1; n + 1 < path.cols(); ++n) {
+    const PathPoint<6> at = recordedPath(path, n, kPeriod);
+    const double t = n * kPeriod;
+    EXPECT_EQ(at.x, Vec6(path.col(n)));
+    EXPECT_NEAR(at.x_dot(2), 0.06 * std::cos(2.0 * t), 1e-5);
+    EXPECT_NEAR(at.x_ddot(2), -0.12 * std::sin(2.0 * t), 1e-5);
+  }
+  EXPECT_EQ(recordedPath(path, -5, kPeriod).x, Vec6(path.col(0)));
+  EXPECT_EQ(recordedPath(path, 1000, kPeriod).x, Vec6(path.col(199)));
+  EXPECT_TRUE(recordedPath(path, 1000, kPeriod).x_dot.isZero(0.0));
+}
+
+TEST(RecordedPath, OfAScenarioIsCommanded) {
+  const Experiment e = test::experiment(
+      "free_decay",
+      {"program=[{path: {rows_m_deg: [[0, 0, 0, 0, 0, 0], [1.0e-4, 0, 0, 0, 0, 0.01], "
+       "[2.0e-4, 0, 0, 0, 0, 0.02], [3.0e-4, 0, 0, 0, 0, 0.03]]}}]"});
+  std::vector<Vec6> seen;
+  runLockstep(e, nullptr, [&](const TickState& state) {
+    if (state.kind == SegmentKind::kPath) seen.push_back(state.motion.x);
+    return Order();
+  });
+  ASSERT_EQ(seen.size(), 4u);
+  EXPECT_NEAR(seen[0](0), 1e-4, 1e-15);
+  EXPECT_NEAR(seen[2](5), 0.03 * kDegree, 1e-15);
+  EXPECT_EQ(seen[3], seen[2]);
 }
 
 // --- As a person does it -------------------------------------------------------------------------

@@ -355,9 +355,12 @@ Eigen::VectorXd Section::vector(std::string_view key, int size, double lo, doubl
 
 Eigen::MatrixXd Section::matrix(std::string_view key, int rows, int cols, double lo, double hi) {
   const Value& value = need(key);
+  if (rows < 0 && value.kind == Value::Kind::kList && !value.children.empty())
+    rows = static_cast<int>(value.children.size());
   if (value.kind != Value::Kind::kList || static_cast<int>(value.children.size()) != rows)
-    fail(key, fmt::format("want {} rows of {} numbers", rows,
-                          cols < 0 ? "equally many" : std::to_string(cols)));
+    fail(key,
+         fmt::format("want {} rows of {} numbers", rows < 0 ? "one or more" : std::to_string(rows),
+                     cols < 0 ? "equally many" : std::to_string(cols)));
   if (cols < 0) cols = static_cast<int>(value.children[0].children.size());
   if (cols == 0) fail(key, "the first row is empty");
   Eigen::MatrixXd out(rows, cols);

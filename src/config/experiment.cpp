@@ -246,7 +246,7 @@ class ProgramReader {
  private:
   void readSegment(Section& item, Segment& segment) {
     const std::string kind = item.onlyKey(
-        {"calibration", "move", "trajectory", "admittance", "watch"}, {"robot", "faults"});
+        {"calibration", "move", "trajectory", "admittance", "watch", "path"}, {"robot", "faults"});
     Section s = item.section(kind);
     if (kind == "calibration") {
       segment.kind = SegmentKind::kCalibration;
@@ -266,11 +266,24 @@ class ProgramReader {
       segment.kind = SegmentKind::kWatch;
       segment.duration = s.number("duration_s", 0.01, 1e6);
       segment.interval = s.number("interval_s", 1.0, 1e6);
+    } else if (kind == "path") {
+      segment.kind = SegmentKind::kPath;
+      readPath(s, segment);
     } else {
       segment.kind = SegmentKind::kAdmittance;
       segment.duration = s.number("duration_s", 0.01, 1e6);
     }
     s.finish();
+  }
+
+  /// A pose a row and period: x y z [m], alpha beta gamma [deg].
+  void readPath(Section& s, Segment& segment) {
+    ControllerConfig& c = out_.controller;
+    if (c.path.cols() > 0) s.fail("rows_m_deg", "is the second path, want one at most");
+    c.path = s.matrix("rows_m_deg", -1, 6, -kAny, kAny).transpose();
+    c.path.bottomRows<3>() *= kDegree;
+    segment.duration =
+        static_cast<double>(c.path.cols()) * static_cast<double>(c.period) * kSecondPerNanosecond;
   }
 
   static Axis readAxis(Section s, int i) {

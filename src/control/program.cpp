@@ -10,6 +10,7 @@ std::string_view name(SegmentKind kind) noexcept {
     case SegmentKind::kTrajectory: return "trajectory";
     case SegmentKind::kAdmittance: return "admittance";
     case SegmentKind::kWatch: return "watch";
+    case SegmentKind::kPath: return "path";
     case SegmentKind::kCount: break;
   }
   return "none";

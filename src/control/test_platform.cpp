@@ -297,6 +297,7 @@ bool TestPlatform::segmentIsOver() const noexcept {
     case SegmentKind::kMove:
     case SegmentKind::kTrajectory:
     case SegmentKind::kAdmittance:
+    case SegmentKind::kPath:
     case SegmentKind::kCount: break;
   }
   return n_ >= steps_;
@@ -342,6 +343,7 @@ void TestPlatform::begin(const Segment& segment) noexcept {
       break;
     case SegmentKind::kTrajectory:
     case SegmentKind::kWatch:
+    case SegmentKind::kPath:
     case SegmentKind::kCount: break;
   }
 }
@@ -400,8 +402,9 @@ PathPoint<6> TestPlatform::moveAt(std::int64_t n) const noexcept {
   return t < brake_.duration() ? brake_.at(t) : move_.at(t - brake_.duration());
 }
 
-/// Of a move or a trajectory, n periods after it began.
+/// Of a move, a trajectory or a recorded path, n periods after it began.
 PathPoint<6> TestPlatform::pathAt(std::int64_t n) const noexcept {
+  if (segment_.kind == SegmentKind::kPath) return recordedPath(config_.path, n, period_);
   return segment_.kind == SegmentKind::kMove
              ? moveAt(n)
              : trajectoryGeneration(segment_.trajectory, segment_start_, n, steps_, period_);
@@ -428,7 +431,8 @@ PathPoint<6> TestPlatform::nextMotion(const Sample& sample) noexcept {
   switch (segment_.kind) {
     case SegmentKind::kCalibration: calibrate(sample); break;
     case SegmentKind::kMove:
-    case SegmentKind::kTrajectory: return pathAt(n);
+    case SegmentKind::kTrajectory:
+    case SegmentKind::kPath: return pathAt(n);
     case SegmentKind::kAdmittance:
       // A wrench that is no number must not enter the model's state; the finite check stops the
       // run.

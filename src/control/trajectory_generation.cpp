@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/control/trajectory_generation.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace ves {
@@ -33,6 +34,17 @@ PathPoint<6> trajectoryGeneration(const Trajectory& trajectory, const Vec6& init
       }
     }
   }
+  return out;
+}
+
+PathPoint<6> recordedPath(const RecordedPath& path, std::int64_t n, double period) noexcept {
+  const auto column = [&](std::int64_t k) {
+    return path.col(std::clamp<std::int64_t>(k, 0, path.cols() - 1));
+  };
+  PathPoint<6> out;
+  out.x = column(n);
+  out.x_dot = (column(n + 1) - column(n - 1)) / (2.0 * period);
+  out.x_ddot = (column(n + 1) - 2.0 * column(n) + column(n - 1)) / (period * period);
   return out;
 }
 

@@ -26,7 +26,8 @@ SegmentKind kindOf(const Row& row) { return static_cast<SegmentKind>(row.state.k
 bool measured(const Row& row) {
   const SegmentKind kind = kindOf(row);
   return running(row) && row.has_truth &&
-         (kind == SegmentKind::kTrajectory || kind == SegmentKind::kAdmittance);
+         (kind == SegmentKind::kTrajectory || kind == SegmentKind::kAdmittance ||
+          kind == SegmentKind::kPath);
 }
 
 struct Tracking {

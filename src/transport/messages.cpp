@@ -255,7 +255,7 @@ std::optional<Order> fromMessage(const operator_t& m) noexcept {
   if (order.request != Request::kRun) return order;
 
   Segment& s = order.segment;
-  if (!inRange(m.kind, 0, static_cast<int>(SegmentKind::kCount) - 1)) return {};
+  if (!inRange(m.kind, 0, static_cast<int>(SegmentKind::kWatch))) return {};
   s.kind = static_cast<SegmentKind>(m.kind);
   s.duration = m.duration;
   s.interval = m.interval;

@@ -84,7 +84,8 @@ class Section {
   std::string choice(std::string_view key, std::initializer_list<std::string_view> allowed);
   /// `size` numbers; any number of them (at least one) when size is -1.
   Eigen::VectorXd vector(std::string_view key, int size, double lo, double hi);
-  /// rows x cols numbers, row by row; as many columns as the first row has when cols is -1.
+  /// rows x cols numbers, row by row; any number of rows (at least one) when rows is -1, as many
+  /// columns as the first row has when cols is -1.
   Eigen::MatrixXd matrix(std::string_view key, int rows, int cols, double lo, double hi);
 
   Section section(std::string_view key);

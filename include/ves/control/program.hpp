@@ -17,6 +17,7 @@ enum class SegmentKind : std::int32_t {
   kTrajectory,
   kAdmittance,  // from wherever the platform is, as the model's state at rest
   kWatch,       // hold, for a look at the sensor every interval
+  kPath,        // the configuration's recorded path
   kCount
 };
 

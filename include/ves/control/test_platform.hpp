@@ -57,6 +57,7 @@ struct ControllerConfig {
   LegCodec legs;
   SafetyLimits safety;
   Program program;
+  RecordedPath path;              // of its path segments
   double gentle_speed = 0.05;     // [m/s] peak, of moves and the return
   double gentle_rotation = 0.10;  // [rad/s] peak
   struct Braking {

@@ -28,4 +28,11 @@ using Trajectory = std::array<Axis, 6>;
 PathPoint<6> trajectoryGeneration(const Trajectory& trajectory, const Vec6& initial, std::int64_t n,
                                   std::int64_t steps, double period) noexcept;
 
+/// A pose a period: {x, y, z, alpha, beta, gamma} in its columns, from home. [m, rad]
+using RecordedPath = Eigen::Matrix<double, 6, Eigen::Dynamic>;
+
+/// Column n, rates and accelerations by central differences; before the first and after the last it
+/// stands. The path has a column at least.
+PathPoint<6> recordedPath(const RecordedPath& path, std::int64_t n, double period) noexcept;
+
 }  // namespace ves
