@@ -83,8 +83,7 @@ struct Options {
     std::vector<std::string> all = overrides;
     if (seed >= 0) all.push_back(fmt::format("seed={}", seed));
     if (force) all.push_back("controller.force=true");
-    return loadExperiment(findScenario(scenario, configFolder()), all, calibration,
-                          masses);
+    return loadExperiment(findScenario(scenario, configFolder()), all, calibration, masses);
   }
 };
 
@@ -92,11 +91,7 @@ struct Options {
 inline void admitOrRefuse(Experiment& experiment) {
   const std::string why = admit(experiment.controller, experiment.plant);
   if (why.empty()) return;
-  const Program& program = experiment.controller.program;
-  const bool wanted =
-      std::any_of(program.segments.begin(), program.segments.begin() + program.size,
-                  [](const Segment& segment) { return segment.kind == SegmentKind::kAdmittance; });
-  if (wanted && !experiment.controller.forced)
+  if (wantsAdmittance(experiment.controller.program) && !experiment.controller.forced)
     throw InputError(fmt::format("{}: {}; --force runs it all the same", experiment.name, why));
   fmt::print(stderr, "warning: {}\n", why);
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/control/program.hpp"
 
+#include <algorithm>
+
 namespace ves {
 
 std::string_view name(SegmentKind kind) noexcept {
@@ -14,6 +16,13 @@ std::string_view name(SegmentKind kind) noexcept {
     case SegmentKind::kCount: break;
   }
   return "none";
+}
+
+bool wantsAdmittance(const Program& program) noexcept {
+  const auto begin = program.segments.begin();
+  return std::any_of(begin, begin + program.size, [](const Segment& segment) {
+    return segment.kind == SegmentKind::kAdmittance;
+  });
 }
 
 std::string_view name(Request request) noexcept {

@@ -142,7 +142,8 @@ Refusal TestPlatform::obey(const Order& order) noexcept {
     case Request::kCount: return Refusal::kNone;
     case Request::kArm:
     case Request::kStart:
-      if (order.request == Request::kStart && !config_.admissible && wantsAdmittance())
+      if (order.request == Request::kStart && !config_.admissible &&
+          wantsAdmittance(config_.program))
         return Refusal::kUnstable;
       if (phase == Phase::kDisarmed) {
         if (forbids(state_.tripped)) return Refusal::kCauseRemains;
@@ -188,13 +189,6 @@ Refusal TestPlatform::obey(const Order& order) noexcept {
       return Refusal::kNone;
   }
   return Refusal::kNone;
-}
-
-bool TestPlatform::wantsAdmittance() const noexcept {
-  const auto begin = config_.program.segments.begin();
-  return std::any_of(begin, begin + config_.program.size, [](const Segment& segment) {
-    return segment.kind == SegmentKind::kAdmittance;
-  });
 }
 
 Refusal TestPlatform::refusesAdmittance() const noexcept {

@@ -39,6 +39,9 @@ struct Program {
   std::array<Segment, kMaxSegments> segments{};
 };
 
+/// One of its segments is admittance control.
+bool wantsAdmittance(const Program& program) noexcept;
+
 /// A calibration takes so many samples, and so does each look of a watch.
 inline constexpr int kCalibrationSamples = 100;  // [-] per channel
 

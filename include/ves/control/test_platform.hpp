@@ -134,7 +134,6 @@ class TestPlatform {
   void measureWrench(const Sample& sample) noexcept;
   Refusal obey(const Order& order) noexcept;
   Refusal accept(const Segment& segment) noexcept;
-  bool wantsAdmittance() const noexcept;
   Refusal refusesAdmittance() const noexcept;
   bool feelsLittle() const noexcept;
   void choosePhase() noexcept;

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// ves sweep: one scenario over many values.
+#include <unistd.h>
+
+#include <thread>
+
+#include "runner.hpp"
+#include "ves/sweep/sweep.hpp"
+
+namespace {
+
+/// Our place among the processes that mpirun (or srun) has started; {0, 1} without.
+std::pair<int, int> place() {
+  for (const auto& [rank, size] : {std::pair{"OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE"},
+                                   {"PMI_RANK", "PMI_SIZE"},
+                                   {"SLURM_PROCID", "SLURM_NTASKS"}}) {
+    const char *r = std::getenv(rank), *s = std::getenv(size);
+    if (!r || !s) continue;
+    const int of = std::atoi(s), at = std::atoi(r);
+    if (of >= 1 && at >= 0 && at < of) return {at, of};
+  }
+  return {0, 1};
+}
+
+std::string duration(double seconds) {
+  if (seconds < 100.0) return fmt::format("{:.0f} s", seconds);
+  if (seconds < 6000.0) return fmt::format("{:.0f} min", seconds / 60.0);
+  return fmt::format("{:.1f} h", seconds / 3600.0);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  using namespace ves;
+  CLI::App cli(
+      "A scenario in lockstep over every combination of the varied values, or random draws, on all "
+      "cores: one row a run in sweep.csv. The same rows whatever the number of workers; the same "
+      "command again goes on where it ended. Under mpirun every process takes its share; they meet "
+      "in one folder.",
+      "ves sweep");
+  std::string scenario, out;
+  std::vector<std::string> sets, vary, draw;
+  std::int64_t runs = 1;
+  std::uint64_t seed = 1;
+  const auto [rank, ranks] = place();
+  int workers = ranks > 1 ? 1 : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  cli.add_option("scenario", scenario, "name in config/scenarios, or a .yaml file")->required();
+  cli.add_option("--vary", vary, "KEY=V1,V2,.. or KEY=FROM:TO:COUNT")->allow_extra_args(false);
+  cli.add_option("--draw", draw, "KEY=FROM:TO, uniform, another one each run")
+      ->allow_extra_args(false);
+  cli.add_option("--runs", runs, "of each combination, each with its own noise")
+      ->check(CLI::Range(1, 100'000'000))
+      ->capture_default_str();
+  cli.add_option("--seed", seed, "of draws and noise")->capture_default_str();
+  cli.add_option("--set", sets, "KEY.PATH=VALUE of every run")->allow_extra_args(false);
+  cli.add_option("--workers", workers, "processes")
+      ->check(CLI::Range(1, 1024))
+      ->capture_default_str();
+  cli.add_option("--out", out, "folder; ves-runs/sweep-SCENARIO by default");
+  return app::run(cli, argc, argv, [&, rank = rank, ranks = ranks] {
+    SweepPlan plan;
+    for (const std::string& option : vary) plan.vary(option);
+    for (const std::string& option : draw) plan.draw(option);
+    plan.repeat(runs);
+    plan.seed(seed);
+    if (plan.size() == 1) throw InputError("one run only: want --vary or --runs");
+    SweepOptions options;
+    options.scenario = findScenario(scenario, app::configFolder());
+    options.overrides = sets;
+    options.workers = workers;
+    options.rank = rank;
+    options.ranks = ranks;
+    // What is wrong with the first and the last is told before hours have passed.
+    for (const std::int64_t run : {std::int64_t{0}, plan.size() - 1}) {
+      std::vector<std::string> all = sets;
+      for (const std::string& one : plan.overrides(run)) all.push_back(one);
+      const Experiment e = loadExperiment(options.scenario, all);
+      if (out.empty()) out = "ves-runs/sweep-" + e.name;
+    }
+    options.file = makeFolder(out) / "sweep.csv";
+    app::catchSignals();
+    const bool terminal = isatty(STDERR_FILENO) != 0;
+    const SweepResult result = sweep(
+        plan, options,
+        [&](const SweepProgress& p) {
+          if (!terminal) return;
+          const double rate = static_cast<double>(p.run_now) / std::max(p.elapsed, 1e-9);
+          fmt::print(stderr, "\r{} of {}, {:.1f} a second, {} left        ", p.done, p.of, rate,
+                     duration(static_cast<double>(p.of - p.done) / rate));
+        },
+        [] { return app::stop_requested != 0; });
+    if (terminal) fmt::print(stderr, "\r{:60}\r", "");
+    if (!result.complete) {
+      fmt::print("{} of {} runs so far; the same command goes on\n", result.rows, plan.size());
+      return ranks > 1 && !app::stop_requested ? app::kDone : app::kTripped;
+    }
+    fmt::print("{} runs, {} of them not to their end\n{}\n", result.rows, result.not_good,
+               options.file.string());
+    return app::kDone;
+  });
+}

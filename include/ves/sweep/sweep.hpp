@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// One scenario many times, over a grid or random draws of its values, on all cores. What a run is
+// depends on its number alone, so neither the workers nor a kill in between change a row.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "ves/config/experiment.hpp"
+
+namespace ves {
+
+/// The runs of a sweep: every combination of the varied values, `draws` times.
+class SweepPlan {
+ public:
+  /// "KEY=V1,V2,.." or "KEY=FROM:TO:COUNT". Throws InputError.
+  void vary(const std::string& option);
+  /// "KEY=FROM:TO", uniform in between, another one each run. Throws InputError.
+  void draw(const std::string& option);
+  /// Runs of each combination, each with a noise seed of its own unless `seed` is varied.
+  void repeat(std::int64_t draws) { draws_ = draws; }
+  void seed(std::uint64_t seed) { seed_ = seed; }
+
+  /// [-] Throws InputError beyond a thousand million.
+  std::int64_t size() const;
+  std::vector<std::string> keys() const;
+  /// "KEY=VALUE" of run `run`, keys() in order.
+  std::vector<std::string> overrides(std::int64_t run) const;
+
+ private:
+  void take(const std::string& key, const std::string& option) const;
+
+  struct Varied {
+    std::string key;
+    std::vector<std::string> values;
+  };
+  struct Drawn {
+    std::string key;
+    double from = 0.0, to = 0.0;
+  };
+  std::vector<Varied> varied_;
+  std::vector<Drawn> drawn_;
+  std::int64_t draws_ = 1;
+  std::uint64_t seed_ = 1;
+};
+
+struct SweepOptions {
+  std::filesystem::path scenario;
+  std::vector<std::string> overrides;  // of every run
+  std::filesystem::path file;          // CSV; what it has already is not run again
+  int workers = 1;                     // [-] processes
+  int rank = 0, ranks = 1;             // [-] of several sweeps that share the runs and a folder
+};
+
+struct SweepProgress {
+  std::int64_t done = 0, of = 0;  // [-] runs, of this rank
+  double elapsed = 0.0;           // [s]
+  std::int64_t run_now = 0;       // [-] of `done`, by this call
+};
+
+struct SweepResult {
+  std::int64_t rows = 0;      // [-] in the file
+  std::int64_t not_good = 0;  // [-] of them: stopped by a check, refused, or not a valid scenario
+  bool complete = false;      // the file has all runs, in order
+};
+
+/// Runs what is missing. `stop` is looked at after every row. Throws InputError.
+SweepResult sweep(const SweepPlan& plan, const SweepOptions& options,
+                  const std::function<void(const SweepProgress&)>& shown,
+                  const std::function<bool()>& stop);
+
+}  // namespace ves

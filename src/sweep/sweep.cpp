@@ -1,0 +1,418 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/sweep/sweep.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <poll.h>
+#include <signal.h>
+#include <sys/file.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <map>
+#include <memory>
+
+#include "ves/analysis/gate.hpp"
+#include "ves/realtime/realtime.hpp"
+#include "ves/report/summary.hpp"
+
+namespace ves {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Numbers of a run's summary that make columns.
+constexpr const char* kNumbers[] = {"simulated_s",
+                                    "x_peak_to_peak_m",
+                                    "x_error_max_m",
+                                    "x_error_rms_m",
+                                    "y_peak_to_peak_m",
+                                    "y_error_max_m",
+                                    "y_error_rms_m",
+                                    "z_peak_to_peak_m",
+                                    "z_error_max_m",
+                                    "z_error_rms_m",
+                                    "alpha_peak_to_peak_rad",
+                                    "alpha_error_max_rad",
+                                    "alpha_error_rms_rad",
+                                    "beta_peak_to_peak_rad",
+                                    "beta_error_max_rad",
+                                    "beta_error_rms_rad",
+                                    "gamma_peak_to_peak_rad",
+                                    "gamma_error_max_rad",
+                                    "gamma_error_rms_rad",
+                                    "dynamic_force_max_still_n",
+                                    "dynamic_moment_max_still_nm",
+                                    "dynamic_force_max_moving_n",
+                                    "dynamic_moment_max_moving_nm"};
+
+/// splitmix64: a stream of its own for every run and key.
+double uniform(std::uint64_t seed, std::uint64_t run, std::uint64_t key) {
+  std::uint64_t z = seed * 0x9e3779b97f4a7c15u + run * 0xbf58476d1ce4e5b9u + key;
+  for (int i = 0; i < 2; ++i) {
+    z += 0x9e3779b97f4a7c15u;
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    z ^= z >> 31;
+  }
+  return static_cast<double>(z >> 11) * 0x1p-53;
+}
+
+bool toNumber(const std::string& text, double& x) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), x);
+  return error == std::errc() && end == text.data() + text.size() && std::isfinite(x);
+}
+
+std::vector<std::string> split(const std::string& text, char at) {
+  std::vector<std::string> out(1);
+  int depth = 0;  // a list is one value
+  for (const char c : text) {
+    depth += (c == '[' || c == '{') - (c == ']' || c == '}');
+    if (c == at && depth == 0)
+      out.emplace_back();
+    else
+      out.back() += c;
+  }
+  return out;
+}
+
+/// A cell of CSV.
+std::string cell(const std::string& text) {
+  if (text.find_first_of(",\"\n") == std::string::npos) return text;
+  std::string out = "\"";
+  for (const char c : text) out += c == '"' ? "\"\"" : std::string(1, c == '\n' ? ' ' : c);
+  return out + "\"";
+}
+
+std::string headerOf(const SweepPlan& plan) {
+  std::string line = "run";
+  for (const std::string& key : plan.keys()) line += "," + cell(key);
+  line += ",ended,first_cause,first_cause_tick";
+  for (const char* number : kNumbers) line += fmt::format(",{}", number);
+  return line;
+}
+
+/// One run, as its row. `log` is a file to use in between.
+std::string rowOf(const SweepPlan& plan, const SweepOptions& options, std::int64_t run,
+                  const std::string& log) {
+  std::vector<std::string> all = options.overrides;
+  std::string row = fmt::format("{}", run);
+  for (const std::string& one : plan.overrides(run)) {
+    all.push_back(one);
+    row += "," + cell(one.substr(one.find('=') + 1));
+  }
+  const std::string rest = std::string(std::size(kNumbers), ',');
+  try {
+    Experiment e = loadExperiment(options.scenario, all);
+    const std::string barred = admit(e.controller, e.plant);
+    if (!e.controller.admissible && wantsAdmittance(e.controller.program))
+      return row + ",refused," + cell(barred) + "," + rest;
+    RunResult result;
+    {
+      LogWriter writer(log);
+      result = runLockstep(e, &writer, {});
+    }
+    const auto summary = summarise(readSeries(log), result);
+    row += fmt::format(",{},{},{}", result.cut_short ? "cut short" : name(result.phase),
+                       name(result.cause), result.cause_tick);
+    for (const char* number : kNumbers)
+      row += summary.contains(number) ? fmt::format(",{}", summary[number].get<double>()) : ",";
+    return row;
+  } catch (const InputError& error) {
+    return row + ",invalid," + cell(error.what()) + "," + rest;
+  }
+}
+
+/// Workers that take the next run from a counter they share, and send rows through one pipe.
+class Workers {
+ public:
+  Workers(const SweepPlan& plan, const SweepOptions& options,
+          const std::vector<std::int64_t>& missing)
+      : next_(static_cast<std::atomic<std::size_t>*>(mmap(nullptr, sizeof(std::atomic<std::size_t>),
+                                                          PROT_READ | PROT_WRITE,
+                                                          MAP_SHARED | MAP_ANONYMOUS, -1, 0))) {
+    if (next_ == MAP_FAILED || pipe2(pipe_, O_CLOEXEC) != 0)
+      throw InputError(fmt::format("--workers: {}", std::strerror(errno)));
+    new (next_) std::atomic<std::size_t>(0);
+    for (int w = 0; w < options.workers; ++w) {
+      const pid_t parent = getpid(), child = fork();
+      if (child < 0) throw InputError(fmt::format("--workers: {}", std::strerror(errno)));
+      if (child == 0) work(plan, options, missing, parent);
+      children_.push_back(child);
+    }
+    close(pipe_[1]);
+    pipe_[1] = -1;
+  }
+  ~Workers() {
+    next_->store(SIZE_MAX / 2);  // no more
+    if (pipe_[0] >= 0) close(pipe_[0]);
+    for (const pid_t child : children_) waitpid(child, nullptr, 0);
+    munmap(next_, sizeof *next_);
+  }
+  Workers(const Workers&) = delete;
+  Workers& operator=(const Workers&) = delete;
+
+  /// The next row; empty when there are no more.
+  std::string row() {
+    for (;;) {
+      const std::size_t end = buffer_.find('\n');
+      if (end != std::string::npos) {
+        std::string line = buffer_.substr(0, end);
+        buffer_.erase(0, end + 1);
+        return line;
+      }
+      char block[4096];
+      const ssize_t n = ::read(pipe_[0], block, sizeof block);
+      if (n < 0 && errno == EINTR) continue;
+      if (n <= 0) return {};
+      buffer_.append(block, static_cast<std::size_t>(n));
+    }
+  }
+
+ private:
+  [[noreturn]] void work(const SweepPlan& plan, const SweepOptions& options,
+                         const std::vector<std::int64_t>& missing, pid_t parent) {
+    ::signal(SIGINT, SIG_IGN);  // the parent ends it, between two runs
+    const std::string log = (fs::temp_directory_path() / fmt::format("ves-sweep-{}", getpid()));
+    try {
+      for (std::size_t at; (at = next_->fetch_add(1)) < missing.size() && getppid() == parent;) {
+        const std::string line = rowOf(plan, options, missing[at], log) + "\n";
+        for (std::size_t sent = 0; sent < line.size();) {
+          const ssize_t n = ::write(pipe_[1], line.data() + sent, line.size() - sent);
+          if (n <= 0) _exit(1);  // nobody listens
+          sent += static_cast<std::size_t>(n);
+        }
+      }
+    } catch (const std::exception& error) {
+      fmt::print(stderr, "ves sweep: a worker ended: {}\n", error.what());
+    }
+    unlink(log.c_str());
+    _exit(0);
+  }
+
+  std::atomic<std::size_t>* next_;
+  int pipe_[2] = {-1, -1};
+  std::vector<pid_t> children_;
+  std::string buffer_;
+};
+
+/// Refuses a folder in which another sweep was begun; else leaves there what this one is.
+void requireSame(const SweepPlan& plan, const SweepOptions& options) {
+  std::string text = fmt::format("{} runs, workers do not matter\n", plan.size());
+  for (const std::int64_t run : {std::int64_t{0}, plan.size() - 1}) {
+    std::vector<std::string> all = options.overrides;
+    for (const std::string& one : plan.overrides(run)) all.push_back(one);
+    text +=
+        fmt::format("run {}: {}\n  configuration {}\n", run, fmt::join(plan.overrides(run), " "),
+                    loadExperiment(options.scenario, all).hash);
+  }
+  const fs::path file = options.file.string() + ".plan";
+  if (std::ifstream in(file, std::ios::binary); in) {
+    const std::string there((std::istreambuf_iterator<char>(in)), {});
+    // Another rank may be writing it.
+    if (there.size() >= text.size() ? there != text : text.compare(0, there.size(), there) != 0)
+      throw InputError(
+          fmt::format("{}: another sweep was begun here; --out another folder", file.string()));
+  }
+  std::ofstream out(file, std::ios::binary);
+  out << text;
+  out.flush();
+  if (!out) throw InputError(file.string() + ": cannot be written");
+}
+
+/// Rows of a file by their run; a last line that a kill cut short is left out.
+std::map<std::int64_t, std::string> readRows(const fs::path& file, const std::string& header,
+                                             std::int64_t runs) {
+  std::map<std::int64_t, std::string> rows;
+  std::ifstream in(file, std::ios::binary);
+  if (!in) return rows;
+  const std::string text((std::istreambuf_iterator<char>(in)), {});
+  std::size_t at = 0;
+  for (int line = 1; at < text.size(); ++line) {
+    const std::size_t end = text.find('\n', at);
+    if (end == std::string::npos) break;
+    const std::string row = text.substr(at, end - at);
+    at = end + 1;
+    if (line == 1) {
+      if (row != header)
+        throw InputError(fmt::format(
+            "{}:1: has other columns than this sweep; --out another folder", file.string()));
+      continue;
+    }
+    std::int64_t run = -1;
+    std::from_chars(row.data(), row.data() + row.find(','), run);
+    if (run < 0 || run >= runs)
+      throw InputError(fmt::format("{}:{}: no row of this sweep of {} runs; --out another folder",
+                                   file.string(), line, runs));
+    rows[run] = row;
+  }
+  return rows;
+}
+
+void writeRows(const fs::path& file, const std::string& header,
+               const std::map<std::int64_t, std::string>& rows) {
+  const fs::path beside = file.string() + ".new";
+  {
+    std::ofstream out(beside, std::ios::binary);
+    out << header << '\n';
+    for (const auto& [run, row] : rows) out << row << '\n';
+    out.flush();
+    if (!out) throw InputError(beside.string() + ": cannot be written");
+  }
+  fs::rename(beside, file);
+}
+
+bool good(const std::string& row) { return row.find(",parked,none,") != std::string::npos; }
+
+fs::path partOf(const SweepOptions& options, int rank) {
+  if (options.ranks == 1) return options.file;
+  return fmt::format("{}.rank{}", options.file.string(), rank);
+}
+
+}  // namespace
+
+void SweepPlan::take(const std::string& key, const std::string& option) const {
+  for (const std::string& other : keys())
+    if (other == key) throw InputError(fmt::format("{}: '{}' is given twice", option, key));
+}
+
+void SweepPlan::vary(const std::string& option) {
+  const std::size_t equals = option.find('=');
+  Varied v;
+  if (equals != std::string::npos && equals > 0) {
+    v.key = option.substr(0, equals);
+    const std::string text = option.substr(equals + 1);
+    const std::vector<std::string> range = split(text, ':');
+    double from = 0.0, to = 0.0, count = 0.0;
+    constexpr double kMost = 1e6;
+    if (range.size() == 3 && toNumber(range[0], from) && toNumber(range[1], to) &&
+        toNumber(range[2], count) && count >= 2 && count <= kMost && count == std::floor(count)) {
+      for (double i = 0.0; i < count; i += 1.0)
+        v.values.push_back(fmt::format("{}", from + (to - from) * i / (count - 1.0)));
+    } else if (range.size() == 1 || text.find('{') != std::string::npos) {
+      v.values = split(text, ',');
+      for (const std::string& value : v.values)
+        if (value.empty()) v.values.clear();
+    }
+  }
+  if (v.values.empty())
+    throw InputError(fmt::format(
+        "--vary '{}': want KEY=V1,V2,.. or KEY=FROM:TO:COUNT with a COUNT of 2 or more", option));
+  take(v.key, "--vary");
+  varied_.push_back(v);
+}
+
+void SweepPlan::draw(const std::string& option) {
+  const std::size_t equals = option.find('='), colon = option.find(':');
+  Drawn d;
+  if (equals == std::string::npos || equals == 0 || colon == std::string::npos || colon < equals ||
+      !toNumber(option.substr(equals + 1, colon - equals - 1), d.from) ||
+      !toNumber(option.substr(colon + 1), d.to) || !(d.from <= d.to))
+    throw InputError(fmt::format("--draw '{}': want KEY=FROM:TO, FROM not above TO", option));
+  d.key = option.substr(0, equals);
+  take(d.key, "--draw");
+  drawn_.push_back(d);
+}
+
+std::int64_t SweepPlan::size() const {
+  constexpr double kMost = 1e9;
+  double product = static_cast<double>(draws_);
+  for (const Varied& v : varied_) product *= static_cast<double>(v.values.size());
+  if (product > kMost)
+    throw InputError(fmt::format("--vary: {:g} runs, want at most {:g}", product, kMost));
+  return static_cast<std::int64_t>(product);
+}
+
+std::vector<std::string> SweepPlan::keys() const {
+  std::vector<std::string> out;
+  for (const Varied& v : varied_) out.push_back(v.key);
+  for (const Drawn& d : drawn_) out.push_back(d.key);
+  if (draws_ > 1 && std::find(out.begin(), out.end(), "seed") == out.end()) out.push_back("seed");
+  return out;
+}
+
+std::vector<std::string> SweepPlan::overrides(std::int64_t run) const {
+  std::vector<std::string> out;
+  std::int64_t left = run / draws_;
+  for (const Varied& v : varied_) {
+    const auto n = static_cast<std::int64_t>(v.values.size());
+    out.push_back(v.key + "=" + v.values[static_cast<std::size_t>(left % n)]);
+    left /= n;
+  }
+  const auto number = static_cast<std::uint64_t>(run);
+  for (std::size_t i = 0; i < drawn_.size(); ++i) {
+    const Drawn& d = drawn_[i];
+    out.push_back(
+        fmt::format("{}={}", d.key, d.from + (d.to - d.from) * uniform(seed_, number, i + 1)));
+  }
+  if (keys().size() > out.size())
+    out.push_back(fmt::format(
+        "seed={}", static_cast<std::int64_t>(std::floor(uniform(seed_, number, 0) * INT32_MAX))));
+  return out;
+}
+
+SweepResult sweep(const SweepPlan& plan, const SweepOptions& options,
+                  const std::function<void(const SweepProgress&)>& shown,
+                  const std::function<bool()>& stop) {
+  const std::int64_t runs = plan.size();
+  const std::string header = headerOf(plan);
+  const fs::path part = partOf(options, options.rank);
+  // Two of them in one file would run everything twice.
+  const int lock = open((part.string() + ".lock").c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0644);
+  if (lock < 0) throw InputError(fmt::format("{}: {}", part.string(), std::strerror(errno)));
+  if (flock(lock, LOCK_EX | LOCK_NB) != 0)
+    throw InputError(fmt::format("{}: another sweep is writing here", part.string()));
+  requireSame(plan, options);
+  std::map<std::int64_t, std::string> rows = readRows(part, header, runs);
+
+  std::vector<std::int64_t> missing;
+  SweepProgress progress;
+  for (std::int64_t run = options.rank; run < runs; run += options.ranks) {
+    ++progress.of;
+    if (!rows.count(run)) missing.push_back(run);
+  }
+  progress.done = progress.of - static_cast<std::int64_t>(missing.size());
+  writeRows(part, header, rows);
+  const std::int64_t start = monotonicNow();
+  if (!missing.empty()) {
+    std::ofstream out(part, std::ios::binary | std::ios::app);
+    Workers workers(plan, options, missing);
+    while (!stop()) {
+      const std::string row = workers.row();
+      if (row.empty()) break;
+      out << row << '\n' << std::flush;
+      if (!out) throw InputError(part.string() + ": cannot be written");
+      ++progress.done;
+      ++progress.run_now;
+      progress.elapsed = static_cast<double>(monotonicNow() - start) * kSecondPerNanosecond;
+      if (shown) shown(progress);
+    }
+  }
+
+  // In order, and of all ranks when the others are done too.
+  rows = readRows(part, header, runs);
+  writeRows(part, header, rows);
+  if (options.ranks > 1) {
+    rows.clear();
+    for (int rank = 0; rank < options.ranks; ++rank)
+      rows.merge(readRows(partOf(options, rank), header, runs));
+    if (std::ssize(rows) == runs) writeRows(options.file, header, rows);
+  }
+  SweepResult result;
+  result.rows = std::ssize(rows);
+  result.complete = result.rows == runs;
+  for (const auto& [run, row] : rows) result.not_good += !good(row);
+  close(lock);
+  if (options.ranks == 1 || result.complete) unlink((part.string() + ".lock").c_str());
+  return result;
+}
+
+}  // namespace ves
