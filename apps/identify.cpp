@@ -42,6 +42,11 @@ int plan(const std::string& scenario, const PosePlanOptions& options, double spe
     return planPoses(staticSetup(e.controller), combinations, e.controller, e.plant.initial_joints,
                      options);
   });
+  if (!std::isfinite(plan.condition))
+    throw InputError(
+        fmt::format("--attitudes {} --poses {}: too few to tell {} combinations and the "
+                    "sensor's biases",
+                    options.attitudes, options.poses, combinations.rank()));
   const std::filesystem::path folder = std::filesystem::absolute(file).parent_path();
   const std::string from =
       std::filesystem::proximate(std::filesystem::absolute(base), folder).string();
@@ -103,10 +108,12 @@ int masses(const std::string& log, const std::string& file) {
   record.kinematics = kinematicsOf(e.controller.payload);
   for (Eigen::Index i = 0; i < full.size(); i += 4)
     record.bodies.push_back({full(i), full.segment<3>(i + 1)});
-  app::writeFile(file, write(record, text + "\nBelow: one set of masses that has all of these. "
-                                            "Single values mean little."));
-  const Value written = loadDocument(file);
-  readMasses(Section(written, ""));  // a mass below zero would be refused
+  const std::string yaml =
+      write(record,
+            text + "\nBelow: one set of masses that has all of these. Single values mean little.");
+  const Value written = parseDocument(yaml, file);
+  readMasses(Section(written, ""));  // what would be refused is not written
+  app::writeFile(file, yaml);
   fmt::print("{}\n", file);
   return app::kDone;
 }
@@ -130,8 +137,8 @@ int iterate(const app::Options& load, const IterativeOptions& options, const std
   if (!file.empty()) {
     std::string text = "rows_m_deg:  # x y z alpha beta gamma from home, a row a period\n";
     for (const auto& x : r.path.colwise())
-      text += fmt::format("  - [{}, {}, {}, {}, {}, {}]\n", x(0), x(1), x(2), x(3) / kDegree,
-                          x(4) / kDegree, x(5) / kDegree);
+      text += fmt::format("  - [{:.7g}, {:.7g}, {:.7g}, {:.7g}, {:.7g}, {:.7g}]\n", x(0), x(1),
+                          x(2), x(3) / kDegree, x(4) / kDegree, x(5) / kDegree);
     app::writeFile(file, text);
     fmt::print("{}\n", file);
   }
@@ -162,7 +169,7 @@ int main(int argc, char** argv) {
   of_plan->add_option("--joint-speed", speed, "mean, of the robot's joints [deg/s | cm/s]")
       ->check(app::inRange(0.1, 1000.0))
       ->capture_default_str();
-  of_plan->add_option("--seed", options.seed, "of the search");
+  of_plan->add_option("--seed", options.seed, "of the search")->check(CLI::Range(0, INT32_MAX));
   of_plan->add_option("--out", file, "scenario file; ves-runs/identify_SCENARIO.yaml by default");
   CLI::App* of_masses = cli.add_subcommand(
       "masses", "mass parameters from a log in which platform and robot stand still in many poses");

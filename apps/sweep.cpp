@@ -17,6 +17,8 @@ std::pair<int, int> place() {
                                    {"SLURM_PROCID", "SLURM_NTASKS"}}) {
     const char *r = std::getenv(rank), *s = std::getenv(size);
     if (!r || !s) continue;
+    // A batch script itself is no task of a step; one that srun has started is.
+    if (std::string_view(rank) == "SLURM_PROCID" && !std::getenv("SLURM_STEP_NUM_TASKS")) continue;
     const int of = std::atoi(s), at = std::atoi(r);
     if (of >= 1 && at >= 0 && at < of) return {at, of};
   }
@@ -52,7 +54,9 @@ int main(int argc, char** argv) {
   cli.add_option("--runs", runs, "of each combination, each with its own noise")
       ->check(CLI::Range(1, 100'000'000))
       ->capture_default_str();
-  cli.add_option("--seed", seed, "of draws and noise")->capture_default_str();
+  cli.add_option("--seed", seed, "of draws and noise")
+      ->check(CLI::Range(0, INT32_MAX))
+      ->capture_default_str();
   cli.add_option("--set", sets, "KEY.PATH=VALUE of every run")->allow_extra_args(false);
   cli.add_option("--workers", workers, "processes")
       ->check(CLI::Range(1, 1024))
@@ -92,8 +96,11 @@ int main(int argc, char** argv) {
         [] { return app::stop_requested != 0; });
     if (terminal) fmt::print(stderr, "\r{:60}\r", "");
     if (!result.complete) {
-      fmt::print("{} of {} runs so far; the same command goes on\n", result.rows, plan.size());
-      return ranks > 1 && !app::stop_requested ? app::kDone : app::kTripped;
+      const bool others = ranks > 1 && !app::stop_requested;
+      fmt::print("{} of {} runs so far; {}\n", result.rows, plan.size(),
+                 others ? fmt::format("the last of the {} processes puts them together", ranks)
+                        : "the same command goes on");
+      return others ? app::kDone : app::kTripped;
     }
     fmt::print("{} runs, {} of them not to their end\n{}\n", result.rows, result.not_good,
                options.file.string());

@@ -365,6 +365,33 @@ TEST(Gate, LooksAtThePosesBetweenTheEndsOfAMove) {
   EXPECT_FALSE(stable("-90"));
 }
 
+TEST(Gate, LooksAtEachMotionWhateverElseThereIs) {
+  const Experiment e = test::experiment(
+      "puma_on_table_4_1",
+      {"program=[{trajectory: {duration_s: 0.1}, robot: [{at_s: 0, duration_s: 5, joint: joint_2, "
+       "to_deg_or_m: 0}]}, {admittance: {duration_s: 400}, robot: [{at_s: 290, duration_s: 1, "
+       "joint: joint_3, to_deg_or_m: 60}, {at_s: 4, duration_s: 1, joint: joint_1, to_deg_or_m: "
+       "0}, "
+       "{at_s: 1, duration_s: 1, joint: joint_1, to_deg_or_m: 100}]}]"});
+  const auto poses = programPoses(e.controller.program, e.plant);
+  const auto near = [&](int joint, double degrees) {
+    return std::any_of(poses.begin(), poses.end(), [&](const JointVector& q) {
+      return std::abs(q(joint) / kDegree - degrees) < 8.0;
+    });
+  };
+  EXPECT_TRUE(near(0, 50.0));
+  EXPECT_TRUE(near(0, 100.0));
+  EXPECT_TRUE(near(2, 75.0));
+  EXPECT_TRUE(near(1, -45.0));  // begun before admittance control, and still under way in it
+  EXPECT_NEAR(poses.back()(0), 0.0, 1e-9);
+}
+
+TEST(Gate, TakesTheRobotAsTheControllerKnowsIt) {
+  Experiment e = test::experiment("srms_deploy_doss", kDiverging);
+  e.plant.payload.robot = RobotModel();  // what a URDF without masses would say
+  EXPECT_FALSE(judge(e.controller, e.plant, false).stable);
+}
+
 TEST(Gate, LetsAFreeBaseDriftAndStillNamesCures) {
   const auto verdict = [](std::vector<std::string> sets) {
     const Experiment e = test::experiment("puma_on_table_4_1", std::move(sets));
@@ -374,8 +401,8 @@ TEST(Gate, LetsAFreeBaseDriftAndStillNamesCures) {
       verdict({"base.stiffness_diagonal=[0,0,0,0,0,0]", "base.damping_diagonal=[0,0,0,0,0,0]"})
           .stable);
   // Free in x alone, too light in the rest: fewer modes, weaker K_P or damping still cure it.
-  const LoopVerdict light = verdict({"base.mass_diagonal=[12,12,12,6,6,6]",
-                                     "base.stiffness_diagonal=[0,250,250,120,120,120]"});
+  const LoopVerdict light = verdict(
+      {"base.mass_diagonal=[12,12,12,6,6,6]", "base.stiffness_diagonal=[0,250,250,120,120,120]"});
   EXPECT_FALSE(light.stable);
   EXPECT_TRUE(light.stable_modes > 0 || light.damping_ratio > 0.0 || light.K_P > 0.0);
 }

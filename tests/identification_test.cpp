@@ -113,6 +113,37 @@ TEST(SeparableCombinations, AnyParametersThatShareThemGiveTheSameWrench) {
   }
 }
 
+TEST(SeparableCombinations, OfASlidingRobotLeaveEveryMassPositive) {
+  RobotModel robot = chain({joint(JointType::kRevolute, Z, Vec3(0.3, 0.0, 0.5)),
+                            joint(JointType::kPrismatic, X, Vec3(0.1, 0.0, 0.2)),
+                            joint(JointType::kRevolute, X, Vec3(0.0, 0.2, 0.0))});
+  robot.base.mass = 100.0;
+  const SeparableCombinations c = separableCombinations(robot);
+  const VectorXd truth = massParameters(robot);
+  for (const VectorXd& prior : {truth, VectorXd(VectorXd::Zero(truth.size()))}) {
+    const VectorXd other = completed(c, c.C * truth, prior);
+    EXPECT_LT((c.C * (other - truth)).cwiseAbs().maxCoeff(), 1e-9);
+    for (int i = 0; i < other.size(); i += 4) EXPECT_GT(other(i), 0.0) << "body " << i / 4;
+  }
+}
+
+TEST(PosePlan, StaysInRangesThatLieFarOff) {
+  Experiment e = test::experiment("puma_on_table_4_1");
+  Link& first = e.controller.payload.robot.links[0];
+  first.lower = 200 * kDegree;
+  first.upper = 300 * kDegree;
+  const StaticSetup setup = staticSetup(e.controller);
+  PosePlanOptions few;
+  few.exchanges = 50;
+  const PosePlan plan = planPoses(setup, separableCombinations(setup.robot), e.controller,
+                                  e.plant.initial_joints, few);
+  for (const PosePlan::Attitude& a : plan.attitudes)
+    for (const JointVector& q : a.q) {
+      EXPECT_GE(q(0), first.lower);
+      EXPECT_LE(q(0), first.upper);
+    }
+}
+
 TEST(PosePlan, IsBetterThanChanceAndInsideTheLimits) {
   const Experiment e = test::experiment("doss_on_table_4_1");
   const StaticSetup setup = staticSetup(e.controller);
@@ -285,10 +316,9 @@ TEST(RecordedPath, OfAScenarioIsCommanded) {
     if (state.kind == SegmentKind::kPath) seen.push_back(state.motion.x);
     return Order();
   });
-  ASSERT_EQ(seen.size(), 4u);
+  ASSERT_EQ(seen.size(), 3u);
   EXPECT_NEAR(seen[0](0), 1e-4, 1e-15);
   EXPECT_NEAR(seen[2](5), 0.03 * kDegree, 1e-15);
-  EXPECT_EQ(seen[3], seen[2]);
 }
 
 // --- As a person does it -------------------------------------------------------------------------

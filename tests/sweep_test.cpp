@@ -183,6 +183,10 @@ TEST_F(Sweep, RefusesByName) {
   refused("z_sine --vary legs.K_P=1,2 --workers 0" + out("s"), "--workers");
   ASSERT_EQ(sweep("free_decay --vary seed=1,2" + out("s")).status, 0);
   refused("free_decay --vary seed=1,3" + out("s"), "another sweep was begun here");
+  ASSERT_EQ(sweep("free_decay --vary seed=1,2,3" + out("t")).status, 0);
+  refused("free_decay --vary seed=1,4,3" + out("t"), "another sweep was begun here");
+  std::ofstream(folder_ / "t/sweep.csv", std::ios::app) << "1garbage\n";
+  refused("free_decay --vary seed=1,2,3" + out("t"), "sweep.csv:5: no row of this sweep");
   refused("z_sine --vary seed=1,2" + out("s"), "another sweep was begun here");
 }
 

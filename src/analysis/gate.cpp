@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 namespace ves {
 namespace {
@@ -27,31 +28,32 @@ bool holds(const ControllerConfig& controller, const plant::PlantConfig& plant,
 }  // namespace
 
 std::vector<JointVector> programPoses(const Program& program, const plant::PlantConfig& plant) {
-  constexpr int kLooks = 16;  // [-] along the motions of a segment
+  constexpr int kLooks = 12;  // [-] along each motion
+  const auto felt = [&](int i) {
+    return i < program.size &&
+           program.segments[static_cast<std::size_t>(i)].kind == SegmentKind::kAdmittance;
+  };
   std::vector<JointVector> out = {plant.initial_joints};
   JointVector at = plant.initial_joints;
   for (int i = 0; i < program.size; ++i) {
-    const bool felt =
-        program.segments[static_cast<std::size_t>(i)].kind == SegmentKind::kAdmittance;
-    if (felt && at != out.back()) out.push_back(at);
+    if (felt(i) && at != out.back()) out.push_back(at);
     std::vector<plant::RobotEvent> events;
-    for (const plant::RobotEvent& event : plant.robot_events)
-      if (event.cue.segment == i) events.push_back(event);
-    if (events.empty()) continue;
+    std::set<std::int64_t> looks;  // [ns]
+    for (const plant::RobotEvent& event : plant.robot_events) {
+      if (event.cue.segment != i) continue;
+      events.push_back(event);
+      for (int k = 0; k <= kLooks; ++k)
+        looks.insert(event.cue.after + std::llround(event.move.duration * 1e9 * k / kLooks));
+    }
     std::stable_sort(events.begin(), events.end(),
                      [](const auto& a, const auto& b) { return a.cue.after < b.cue.after; });
-    const std::int64_t begin = events.front().cue.after;
-    std::int64_t end = begin;
-    for (const plant::RobotEvent& event : events)
-      end = std::max<std::int64_t>(end, event.cue.after + std::llround(event.move.duration * 1e9));
     JointPaths paths(kMaxJoints, at);
     auto next = events.begin();
-    for (int look = 1; look <= kLooks; ++look) {
-      const std::int64_t now = begin + (end - begin) / kLooks * look;
+    for (const std::int64_t now : looks) {
       for (; next != events.end() && next->cue.after <= now; ++next)
         paths.move(next->move, next->cue.after);
-      at = paths.at(look == kLooks ? end : now).q;
-      if (felt) out.push_back(at);
+      at = paths.at(now).q;
+      if (felt(i) || felt(i + 1)) out.push_back(at);  // a motion may outlast its segment
     }
   }
   return out;

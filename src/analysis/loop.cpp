@@ -179,7 +179,8 @@ Loop loopOf(const ControllerConfig& controller, const plant::PlantConfig& p, con
             Direction direction) {
   Loop loop;
   loop.base = controller.admittance;
-  loop.robot_P = combine(RigidBody{}, p.payload.X_PL0(), locked(carried(p.payload), q));
+  loop.robot_P =
+      combine(RigidBody{}, controller.payload.X_PL0(), locked(carried(controller.payload), q));
   loop.period = static_cast<double>(controller.period) * kSecondPerNanosecond;
   const double extend = p.actuator.gain_extend, retract = p.actuator.gain_retract;
   double K = 2.0 * extend * retract / (extend + retract);

@@ -282,8 +282,7 @@ class ProgramReader {
     if (c.path.cols() > 0) s.fail("rows_m_deg", "is the second path, want one at most");
     c.path = s.matrix("rows_m_deg", -1, 6, -kAny, kAny).transpose();
     c.path.bottomRows<3>() *= kDegree;
-    segment.duration =
-        static_cast<double>(c.path.cols()) * static_cast<double>(c.period) * kSecondPerNanosecond;
+    segment.duration = static_cast<double>((c.path.cols() - 1) * c.period) * kSecondPerNanosecond;
   }
 
   static Axis readAxis(Section s, int i) {
@@ -472,11 +471,13 @@ Experiment build(const Value& document) {
   if (root.has("masses")) {
     Section section = root.section("masses");
     const MassRecord masses = readMasses(section);
-    if (masses.kinematics != kinematicsOf(c.payload) ||
-        std::ssize(masses.bodies) != c.payload.robot.joints + 1)
+    if (masses.kinematics != kinematicsOf(c.payload))
       section.fail("kinematics", fmt::format("{} is of another robot, mount or sensor, want {}; "
                                              "identify again",
                                              masses.kinematics, kinematicsOf(c.payload)));
+    if (std::ssize(masses.bodies) != c.payload.robot.joints + 1)
+      section.fail("bodies", fmt::format("are {}, want {}: link 0 and a link for each joint",
+                                         masses.bodies.size(), c.payload.robot.joints + 1));
     c.payload = withMasses(c.payload, masses);
   }
 

@@ -211,16 +211,26 @@ MassEstimate estimateMasses(const StaticSetup& setup, const SeparableCombination
 
 VectorXd completed(const SeparableCombinations& combinations, const VectorXd& beta,
                    const VectorXd& prior) {
+  // Masses that are told only together share their sum as in the prior: those from one that leads
+  // to before the next.
   const Index bodies = prior.size() / 4;
-  VectorXd full = prior;
-  double total = 0.0;
-  for (Index i = 0; i < bodies; ++i) total += prior(4 * i);
-  if (!(total > 0.0)) {
-    full.setZero();
-    for (Index i = 0; i < bodies; ++i) full(4 * i) = 1.0;
-    total = static_cast<double>(bodies);
+  VectorXd full = VectorXd::Zero(prior.size());
+  for (Index row = 0; row < combinations.rank(); ++row) {
+    const Index lead = combinations.leads[static_cast<std::size_t>(row)];
+    if (lead % 4 != 0) continue;
+    const Index begin = lead / 4;
+    Index next = bodies;
+    for (const int other : combinations.leads)
+      if (other % 4 == 0 && other > lead) next = std::min<Index>(next, other / 4);
+    double total = 0.0;
+    for (Index i = begin; i < next; ++i) total += prior(4 * i);
+    for (Index i = begin; i < next; ++i) {
+      const double share =
+          total > 0.0 ? prior(4 * i) / total : 1.0 / static_cast<double>(next - begin);
+      full(4 * i) = share * beta(row);
+      if (total > 0.0) full.segment<3>(4 * i + 1) = prior.segment<3>(4 * i + 1) * beta(row) / total;
+    }
   }
-  full *= beta(0) / total;  // m0 leads, and all masses follow it
   for (const int lead : combinations.leads) full(lead) = 0.0;
   full(combinations.leads) = (beta - combinations.C * full).eval();
   return full;

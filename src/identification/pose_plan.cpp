@@ -94,7 +94,10 @@ class Planner {
     for (int k = 0; k < setup_.robot.joints; ++k) {
       const Link& link = setup_.robot.link(k);
       const double most = link.type == JointType::kRevolute ? M_PI : 1.0;
-      q(k) = between(std::max(link.lower, -most), std::min(link.upper, most));
+      // Of a long range, what lies about its middle; of one without end, about zero.
+      const bool ends = std::isfinite(link.lower) && std::isfinite(link.upper);
+      const double middle = ends ? 0.5 * (link.lower + link.upper) : 0.0;
+      q(k) = between(std::max(link.lower, middle - most), std::min(link.upper, middle + most));
     }
     return q;
   }

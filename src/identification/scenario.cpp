@@ -26,6 +26,9 @@ StaticSetup staticSetup(const ControllerConfig& controller) {
 
 std::string scenarioOf(const PosePlan& plan, const Experiment& experiment, const std::string& name,
                        const std::string& from, double speed) {
+  std::string quoted = "'";
+  for (const char letter : from) quoted += letter == '\'' ? "''" : std::string(1, letter);
+  quoted += "'";
   const RobotModel& robot = experiment.controller.payload.robot;
   const ControllerConfig& c = experiment.controller;
   JointVector at = experiment.plant.initial_joints;
@@ -83,7 +86,7 @@ std::string scenarioOf(const PosePlan& plan, const Experiment& experiment, const
       "from: {}\nname: {}\ndescription: The robot's static wrench in many poses, to identify its "
       "mass parameters.\nprogram:\n{}",
       plan.attitudes.size(), plan.attitudes.front().q.size(), plan.condition, plan.condition_random,
-      from, name, program);
+      quoted, name, program);
 }
 
 }  // namespace ves

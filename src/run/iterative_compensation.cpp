@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/run/iterative_compensation.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -48,17 +50,21 @@ class Passes {
     e.controller.path = stretched(path, slower);
     const std::int64_t period = e.controller.period;
     program.segments[kPath].duration =
-        static_cast<double>(e.controller.path.cols() * period) * kSecondPerNanosecond;
+        static_cast<double>((e.controller.path.cols() - 1) * period) * kSecondPerNanosecond;
 
     felt = Wrenches::Zero(6, path.cols());
+    Eigen::VectorXd looks = Eigen::VectorXd::Zero(path.cols());
     std::int64_t n = 0;
     const RunResult run = runLockstep(e, nullptr, [&](const TickState& state) {
       if (state.phase == Phase::kRunning && state.segment == kPath) {
-        const Eigen::Index column = std::min<Eigen::Index>(++n / slower, path.cols() - 1);
-        felt.col(column) += state.total.stacked() / slower;
+        ++n;
+        const Eigen::Index nearest = std::min((n + slower / 2) / slower, path.cols() - 1);
+        felt.col(nearest) += state.total.stacked();
+        looks(nearest) += 1.0;
       }
       return Order();
     });
+    felt.array().rowwise() /= looks.cwiseMax(1.0).transpose().array();
     result_.machine_time += run.simulated;
     if (run.cause != Check::kCount) result_.stopped_by = run.cause;
     return run.good();
@@ -90,8 +96,13 @@ IterativeResult compensateIteratively(const Experiment& experiment, const Iterat
                                       const std::function<void(const IterativeChange&)>& shown) {
   IterativeResult out;
   Passes passes(experiment, out);
+  constexpr Eigen::Index kMostRows = 25'000;
+  const RecordedPath start = passes.start();
+  if (start.cols() > kMostRows)
+    throw InputError(fmt::format("{}: its admittance segment takes {} periods, want at most {}",
+                                 experiment.name, start.cols(), kMostRows));
   const double period = static_cast<double>(experiment.controller.period) * kSecondPerNanosecond;
-  out.path = passes.start();
+  out.path = start;
   for (int i = 0; i < options.most; ++i) {
     Wrenches weight, felt;
     if (!passes.feel(out.path, options.slower, weight) || !passes.feel(out.path, 1, felt))

@@ -8,6 +8,7 @@
 #include <signal.h>
 #include <sys/file.h>
 #include <sys/mman.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -92,6 +93,15 @@ std::string cell(const std::string& text) {
   return out + "\"";
 }
 
+/// How many cells a line of CSV has.
+std::ptrdiff_t cells(const std::string& line) {
+  bool inside = false;
+  return 1 + std::count_if(line.begin(), line.end(), [&](char c) {
+           if (c == '"') inside = !inside;
+           return c == ',' && !inside;
+         });
+}
+
 std::string headerOf(const SweepPlan& plan) {
   std::string line = "run";
   for (const std::string& key : plan.keys()) line += "," + cell(key);
@@ -135,7 +145,7 @@ std::string rowOf(const SweepPlan& plan, const SweepOptions& options, std::int64
 class Workers {
  public:
   Workers(const SweepPlan& plan, const SweepOptions& options,
-          const std::vector<std::int64_t>& missing)
+          const std::vector<std::int64_t>& missing, int lock)
       : next_(static_cast<std::atomic<std::size_t>*>(mmap(nullptr, sizeof(std::atomic<std::size_t>),
                                                           PROT_READ | PROT_WRITE,
                                                           MAP_SHARED | MAP_ANONYMOUS, -1, 0))) {
@@ -145,7 +155,13 @@ class Workers {
     for (int w = 0; w < options.workers; ++w) {
       const pid_t parent = getpid(), child = fork();
       if (child < 0) throw InputError(fmt::format("--workers: {}", std::strerror(errno)));
-      if (child == 0) work(plan, options, missing, parent);
+      if (child == 0) {
+        // Ours alone: a child that outlives us must neither hold the lock nor a pipe open.
+        prctl(PR_SET_PDEATHSIG, SIGKILL);
+        close(lock);
+        close(pipe_[0]);
+        work(plan, options, missing, parent);
+      }
       children_.push_back(child);
     }
     close(pipe_[1]);
@@ -181,13 +197,18 @@ class Workers {
   [[noreturn]] void work(const SweepPlan& plan, const SweepOptions& options,
                          const std::vector<std::int64_t>& missing, pid_t parent) {
     ::signal(SIGINT, SIG_IGN);  // the parent ends it, between two runs
+    ::signal(SIGTERM, SIG_IGN);
+    ::signal(SIGPIPE, SIG_IGN);
     const std::string log = (fs::temp_directory_path() / fmt::format("ves-sweep-{}", getpid()));
     try {
       for (std::size_t at; (at = next_->fetch_add(1)) < missing.size() && getppid() == parent;) {
         const std::string line = rowOf(plan, options, missing[at], log) + "\n";
         for (std::size_t sent = 0; sent < line.size();) {
           const ssize_t n = ::write(pipe_[1], line.data() + sent, line.size() - sent);
-          if (n <= 0) _exit(1);  // nobody listens
+          if (n <= 0) {  // nobody listens
+            unlink(log.c_str());
+            _exit(1);
+          }
           sent += static_cast<std::size_t>(n);
         }
       }
@@ -206,14 +227,11 @@ class Workers {
 
 /// Refuses a folder in which another sweep was begun; else leaves there what this one is.
 void requireSame(const SweepPlan& plan, const SweepOptions& options) {
-  std::string text = fmt::format("{} runs, workers do not matter\n", plan.size());
-  for (const std::int64_t run : {std::int64_t{0}, plan.size() - 1}) {
-    std::vector<std::string> all = options.overrides;
-    for (const std::string& one : plan.overrides(run)) all.push_back(one);
-    text +=
-        fmt::format("run {}: {}\n  configuration {}\n", run, fmt::join(plan.overrides(run), " "),
-                    loadExperiment(options.scenario, all).hash);
-  }
+  std::vector<std::string> all = options.overrides;
+  for (const std::string& one : plan.overrides(0)) all.push_back(one);
+  const std::string text = plan.text() + fmt::format("set {}\nconfiguration of run 0: {}\n",
+                                                     fmt::join(options.overrides, " "),
+                                                     loadExperiment(options.scenario, all).hash);
   const fs::path file = options.file.string() + ".plan";
   if (std::ifstream in(file, std::ios::binary); in) {
     const std::string there((std::istreambuf_iterator<char>(in)), {});
@@ -248,8 +266,9 @@ std::map<std::int64_t, std::string> readRows(const fs::path& file, const std::st
       continue;
     }
     std::int64_t run = -1;
-    std::from_chars(row.data(), row.data() + row.find(','), run);
-    if (run < 0 || run >= runs)
+    const auto [stop, error] = std::from_chars(row.data(), row.data() + row.size(), run);
+    const bool number = error == std::errc() && stop != row.data() + row.size() && *stop == ',';
+    if (!number || run < 0 || run >= runs || cells(row) != cells(header))
       throw InputError(fmt::format("{}:{}: no row of this sweep of {} runs; --out another folder",
                                    file.string(), line, runs));
     rows[run] = row;
@@ -259,7 +278,7 @@ std::map<std::int64_t, std::string> readRows(const fs::path& file, const std::st
 
 void writeRows(const fs::path& file, const std::string& header,
                const std::map<std::int64_t, std::string>& rows) {
-  const fs::path beside = file.string() + ".new";
+  const fs::path beside = fmt::format("{}.{}.new", file.string(), getpid());
   {
     std::ofstream out(beside, std::ios::binary);
     out << header << '\n';
@@ -339,6 +358,15 @@ std::vector<std::string> SweepPlan::keys() const {
   return out;
 }
 
+std::string SweepPlan::text() const {
+  std::string out =
+      fmt::format("{} runs, {} of each combination, seed {}\n", size(), draws_, seed_);
+  for (const Varied& v : varied_)
+    out += fmt::format("vary {}={}\n", v.key, fmt::join(v.values, ","));
+  for (const Drawn& d : drawn_) out += fmt::format("draw {}={}:{}\n", d.key, d.from, d.to);
+  return out;
+}
+
 std::vector<std::string> SweepPlan::overrides(std::int64_t run) const {
   std::vector<std::string> out;
   std::int64_t left = run / draws_;
@@ -384,10 +412,16 @@ SweepResult sweep(const SweepPlan& plan, const SweepOptions& options,
   const std::int64_t start = monotonicNow();
   if (!missing.empty()) {
     std::ofstream out(part, std::ios::binary | std::ios::app);
-    Workers workers(plan, options, missing);
+    Workers workers(plan, options, missing, lock);
     while (!stop()) {
       const std::string row = workers.row();
-      if (row.empty()) break;
+      if (row.empty()) {
+        if (progress.done < progress.of)
+          throw InputError(
+              "--workers: they ended before their work did (no room for their files in " +
+              fs::temp_directory_path().string() + "?)");
+        break;
+      }
       out << row << '\n' << std::flush;
       if (!out) throw InputError(part.string() + ": cannot be written");
       ++progress.done;

@@ -39,7 +39,7 @@ struct Loop {
 /// long as its speed is nearly a sine.
 enum class Direction { kExtending, kRetracting, kSwinging };
 
-/// The loop of an experiment, the robot's joints at q.
+/// The loop of an experiment, the robot as the controller believes it, its joints at q.
 Loop loopOf(const ControllerConfig& controller, const plant::PlantConfig& plant,
             const JointVector& q, Direction direction);
 

@@ -74,8 +74,9 @@ Eigen::MatrixXd countRegressor(const StaticSetup& setup, const JointVector& q, c
 MassEstimate estimateMasses(const StaticSetup& setup, const SeparableCombinations& combinations,
                             const std::vector<Rest>& rests);
 
-/// A full set of parameters that has these combinations: those that lead none keep their share of
-/// the total mass in `prior` (equal shares when it has none), the others take what is left. The
+/// A full set of parameters that has these combinations: masses that are told only together share
+/// their sum as in `prior` (equally when it has none), and so do their first moments; what leads a
+/// combination takes what is left. The
 /// same static wrench in every pose; single values mean little.
 Eigen::VectorXd completed(const SeparableCombinations& combinations, const Eigen::VectorXd& beta,
                           const Eigen::VectorXd& prior);

@@ -28,7 +28,7 @@ struct PosePlanOptions {
 };
 
 /// Exchanges one attitude or one robot pose at a time for a random one, and keeps what lowers the
-/// condition number. Inside the joints' ranges (half a turn where a joint has none, 1 m), the
+/// condition number. Inside the joints' ranges (half a turn or 1 m about their middle at most), the
 /// platform's safety limits, and four fifths of the sensor's range by the masses in `setup`, on the
 /// way too, from `start` and home. The same for one seed. Throws std::domain_error when no pose
 /// fits.

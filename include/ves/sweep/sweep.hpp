@@ -26,6 +26,8 @@ class SweepPlan {
   /// [-] Throws InputError beyond a thousand million.
   std::int64_t size() const;
   std::vector<std::string> keys() const;
+  /// All that a sweep is, for a person and to compare.
+  std::string text() const;
   /// "KEY=VALUE" of run `run`, keys() in order.
   std::vector<std::string> overrides(std::int64_t run) const;
 
