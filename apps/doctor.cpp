@@ -112,7 +112,10 @@ int main(int argc, char** argv) {
     const bool ran = loop.is_object() && loop.contains("wake_up_late_median_s");
     if (ran) {
       show("our controller wakes", of(loop, "wake_up_late"));
-      show("and has computed, bus included", of(loop, "tick_compute"));
+      show("takes its messages in", of(loop, "stage_receive"));
+      show("ticks", of(loop, "stage_tick"));
+      show("sends its command", of(loop, "stage_send"));
+      show("from waking to the command", of(loop, "tick_compute"));
     }
     if (realtime) claimRealtime(80, false);
     show("a bare ticker wakes", wakeUp(seconds, kPeriod), realtime ? "SCHED_FIFO" : "best effort");
@@ -120,7 +123,13 @@ int main(int argc, char** argv) {
       show("cyclictest", *reference, realtime ? "SCHED_FIFO" : "best effort");
     else
       fmt::print("       {:<32}not installed: apt install rt-tests\n", "cyclictest");
-    show("LCM there and back", echo(url, static_cast<int>(200.0 * seconds)), "bare, two processes");
+    const int times = static_cast<int>(200.0 * seconds);
+    const Latency bare = echo(url, times);
+    show("LCM there and back", bare, "bare, two processes");
+    const Latency ours = response(
+        loadExperiment(app::configFolder() / "scenarios" / "puma_on_table_4_1.yaml"), url, times);
+    show("sample to command", ours,
+         fmt::format("our controller in between: {:.2f} x", ours.median / bare.median));
     if (!ran) {
       fmt::print("BAD    a run of our own did not end well: try ./ves demo\n");
       return app::kTripped;

@@ -3,8 +3,11 @@
 // The control path and the plant's stepping never touch the heap, whatever the tick does.
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <thread>
+
 #include "support/malloc_guard.hpp"
-#include "ves/config/experiment.hpp"
+#include "ves/run/run.hpp"
 
 namespace ves {
 namespace {
@@ -63,6 +66,49 @@ TEST_P(NoHeap, ThroughATripAndTheHold) {
   const std::int64_t calls = guard.count();
   EXPECT_EQ(calls, 0);
   EXPECT_TRUE(platform.done());
+}
+
+/// The loops of both processes in real time, the bus between them: from the handshake on.
+TEST(NoHeapOverTheBus, InThePeriodicPathsOfBothProcesses) {
+  try {
+    enterPrivateBus();
+  } catch (const InputError& error) {
+    GTEST_SKIP() << error.what();
+  }
+  // A loaded machine may sleep through samples; this is not about that.
+  const Experiment e = experiment(
+      "free_decay", {"program=[{admittance: {duration_s: 1}}]", "safety.stale_ticks=1000",
+                     "safety.stall_ticks=1000", "safety.overruns_per_second=1000",
+                     "safety.position_error_still_m=0.1", "safety.reading_jump_m=1"});
+  constexpr int kSettled = 20;  // [-] turns of the loop
+  std::atomic<bool> stop = false;
+  std::int64_t plant_calls = -1, plant_turns = 0;
+  std::thread plant([&] {
+    std::optional<test::MallocGuard> guard;
+    runPlant(e, {}, [&] {
+      if (++plant_turns == kSettled) guard.emplace();
+      if (guard) plant_calls = guard->count();
+      return stop.load();
+    });
+  });
+  std::int64_t calls = -1, turns = 0;
+  {
+    std::optional<test::MallocGuard> guard;
+    ProcessOptions options;
+    options.start = true;
+    const RunResult result = runController(e, options, [&](const TickState& state) {
+      if (state.count >= 0 && ++turns == kSettled) guard.emplace();
+      if (guard) calls = guard->count();
+      return Order();
+    });
+    EXPECT_EQ(result.phase, Phase::kParked);
+  }
+  stop = true;
+  plant.join();
+  EXPECT_GT(turns, 100);
+  EXPECT_GT(plant_turns, 500);
+  EXPECT_EQ(calls, 0);
+  EXPECT_EQ(plant_calls, 0);
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenarios, NoHeap,

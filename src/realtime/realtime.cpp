@@ -16,6 +16,13 @@ namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000;  // [ns]
 
+/// Touches more stack than a tick uses, so that no page is missing later.
+void prefaultStack() noexcept {
+  constexpr std::size_t kStack = 256 * 1024, kPage = 4096;  // [B]
+  std::uint8_t stack[kStack];
+  for (volatile std::uint8_t* p = stack; p < stack + kStack; p += kPage) *p = 0;
+}
+
 }  // namespace
 
 std::int64_t monotonicNow() noexcept {
@@ -48,7 +55,10 @@ bool claimRealtime(int priority, bool required) {
     refused = "SCHED_FIFO";
   else if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0)
     refused = "locked memory";
-  if (!refused) return true;
+  if (!refused) {
+    prefaultStack();
+    return true;
+  }
   const std::string reason = fmt::format("{} refused: {} (see ulimit -r and -l, or run as root)",
                                          refused, std::strerror(errno));
   if (required) throw InputError("--realtime: " + reason);

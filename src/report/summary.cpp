@@ -149,30 +149,41 @@ void addDrift(const Series& series, nlohmann::ordered_json& out) {
   }
 }
 
+/// Of a real-time run: the medians and tails of its times, their histograms, and the missed ticks.
 void addTiming(const Series& series, nlohmann::ordered_json& out) {
-  std::vector<double> late, compute, age;
-  std::int64_t missed = 0;
-  for (const Row& row : series.rows) {
-    if (!row.has_timing) continue;
-    late.push_back(static_cast<double>(row.timing.late_ns) * kSecondPerNanosecond);
-    compute.push_back(static_cast<double>(row.timing.compute_ns) * kSecondPerNanosecond);
-    age.push_back(static_cast<double>(row.timing.sample_age_ns) * kSecondPerNanosecond);
-    missed = row.timing.missed;
-  }
-  if (late.empty()) return;
-  const auto write = [&](const char* name, std::vector<double>& values) {
-    std::sort(values.begin(), values.end());
+  const timing_t* last = nullptr;
+  for (const Row& row : series.rows)
+    if (row.has_timing) last = &row.timing;
+  if (!last) return;
+  const auto write = [&](const std::string& name, std::int64_t timing_t::*value) {
+    std::vector<std::int64_t> all;
+    for (const Row& row : series.rows)
+      if (row.has_timing) all.push_back(row.timing.*value);
+    std::sort(all.begin(), all.end());
     const auto at = [&](double share) {
-      return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
+      const auto i = static_cast<std::size_t>(share * static_cast<double>(all.size() - 1));
+      return static_cast<double>(all[i]) * kSecondPerNanosecond;
     };
-    out[fmt::format("{}_median_s", name)] = at(0.5);
-    out[fmt::format("{}_p99_s", name)] = at(0.99);
-    out[fmt::format("{}_max_s", name)] = at(1.0);
+    out[name + "_median_s"] = at(0.5);
+    out[name + "_p99_s"] = at(0.99);
+    out[name + "_max_s"] = at(1.0);
   };
-  write("wake_up_late", late);
-  write("tick_compute", compute);
-  write("sample_age", age);
-  out["ticks_missed"] = missed;
+  write("wake_up_late", &timing_t::late_ns);
+  write("tick_compute", &timing_t::compute_ns);
+  write("stage_receive", &timing_t::receive_ns);
+  write("stage_tick", &timing_t::tick_ns);
+  write("stage_send", &timing_t::send_ns);
+  write("stage_tell", &timing_t::tell_ns);
+  write("sample_age", &timing_t::sample_age_ns);
+  write("sample_to_command", &timing_t::sample_to_command_ns);
+  // Counts below 1, 2, 4, .. us, the last bin everything beyond.
+  out["wake_up_late_histogram"] = last->late;
+  out["tick_compute_histogram"] = last->compute;
+  out["sample_age_histogram"] = last->sample_age;
+  out["sample_to_command_histogram"] = last->sample_to_command;
+  out["ticks_missed"] = last->missed;
+  out["ticks_missed_woke_late"] = last->missed_woke_late;
+  out["ticks_missed_ran_long"] = last->missed_ran_long;
 }
 
 }  // namespace
@@ -268,14 +279,21 @@ std::string table(const nlohmann::ordered_json& s) {
                          number(w + "_drift_temperature_correlation"));
     }
   }
-  if (s.contains("wake_up_late_median_s"))
+  if (s.contains("wake_up_late_median_s")) {
     out += fmt::format(
         "  timing   woke {:.0f} us late (p99 {:.0f}, max {:.0f}), computed {:.0f} us (p99 {:.0f}), "
-        "sample {:.1f} ms old, {} ticks missed\n",
+        "sample {:.1f} ms old\n",
         number("wake_up_late_median_s") * 1e6, number("wake_up_late_p99_s") * 1e6,
         number("wake_up_late_max_s") * 1e6, number("tick_compute_median_s") * 1e6,
-        number("tick_compute_p99_s") * 1e6, number("sample_age_median_s") * 1e3,
-        s["ticks_missed"].get<std::int64_t>());
+        number("tick_compute_p99_s") * 1e6, number("sample_age_median_s") * 1e3);
+    const auto missed = s["ticks_missed"].get<std::int64_t>();
+    out += missed == 0 ? "           no tick missed\n"
+                       : fmt::format(
+                             "           {} ticks missed: {} woken late for, {} after one "
+                             "that ran long\n",
+                             missed, s["ticks_missed_woke_late"].get<std::int64_t>(),
+                             s["ticks_missed_ran_long"].get<std::int64_t>());
+  }
   return out;
 }
 

@@ -15,6 +15,7 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <functional>
 #include <sstream>
 #include <thread>
 
@@ -194,50 +195,122 @@ std::optional<Latency> cyclictest(double seconds, std::int64_t period, bool real
   return pclose(pipe) == 0 ? cyclictestLatency(text) : std::nullopt;
 }
 
-Latency echo(const std::string& url, int times) {
-  constexpr int kPatience = 200;  // [ms] for one answer
-  constexpr const char* kThere = "VES_ECHO_THERE";
-  constexpr const char* kBack = "VES_ECHO_BACK";
-  const pid_t parent = getpid(), child = fork();
-  if (child < 0) throw InputError("echo: no second process");
-  if (child == 0) {
+namespace {
+
+constexpr int kPatience = 200;             // [ms] for one answer
+constexpr int kWarm = 20;                  // [-] first ones that do not count
+constexpr std::int64_t kPace = 5'000'000;  // [ns]
+
+/// Runs `work` in a process of its own while it lives.
+class Other {
+ public:
+  explicit Other(const std::function<void()>& work) : child_(fork()) {
+    if (child_ < 0) throw InputError("doctor: no second process");
+    if (child_ > 0) return;
     try {
-      Bus bus(url);
-      leg_command_t answer{};
-      bus.subscribe(kThere, [&](const std::string&, const void* data, std::uint32_t size) {
-        sample_t m;
-        if (m.decode(data, 0, static_cast<int>(size)) < 0) return;
-        answer.header.sequence = m.header.sequence;
-        bus.publish(kBack, answer);
-      });
-      while (getppid() == parent) bus.wait(kPatience);
-    } catch (const std::exception&) {
+      work();
+    } catch (const std::exception&) {  // its silence is noticed
     }
     _exit(0);
   }
-  std::vector<double> all;
-  {
-    Bus bus(url);
-    std::int64_t heard = -1;
-    bus.subscribe(kBack, [&](const std::string&, const void* data, std::uint32_t size) {
-      leg_command_t m;
-      if (m.decode(data, 0, static_cast<int>(size)) >= 0) heard = m.header.sequence;
-    });
-    sample_t sample{};
-    constexpr int kWarm = 20;
-    for (int i = 0; i < times + kWarm; ++i) {
-      sample.header.sequence = i;
-      const std::int64_t sent = monotonicNow();
-      bus.publish(kThere, sample);
-      while (heard != i && monotonicNow() - sent < kPatience * 1'000'000LL) bus.wait(kPatience);
-      if (heard == i && i >= kWarm)
-        all.push_back(static_cast<double>(monotonicNow() - sent) * kSecondPerNanosecond);
-    }
+  ~Other() {
+    kill(child_, SIGTERM);
+    waitpid(child_, nullptr, 0);
   }
-  kill(child, SIGTERM);
-  waitpid(child, nullptr, 0);
-  if (all.empty()) throw InputError(fmt::format("echo: bus {}: nothing came back", url));
+  Other(const Other&) = delete;
+  Other& operator=(const Other&) = delete;
+
+ private:
+  pid_t child_;
+};
+
+/// From `send(i)` until `heard()` is i, for i from `first`, as often as asked: one every kPace, as
+/// in a running loop, so that nobody is still busy with the last.
+template <typename Send, typename Heard>
+Latency thereAndBack(Bus& bus, int first, int times, const Send& send, const Heard& heard) {
+  std::vector<double> all;
+  Ticker pace(kPace);
+  for (int i = first; i < first + times + kWarm; ++i) {
+    pace.wait();
+    const std::int64_t sent = send(i);
+    while (heard() != i && monotonicNow() - sent < kPatience * 1'000'000LL) bus.wait(kPatience);
+    if (heard() == i && i >= first + kWarm)
+      all.push_back(static_cast<double>(monotonicNow() - sent) * kSecondPerNanosecond);
+  }
+  if (all.empty()) throw InputError("doctor: nothing comes back");
   return latencyOf(all);
+}
+
+}  // namespace
+
+Latency echo(const std::string& url, int times) {
+  constexpr const char* kThere = "VES_ECHO_THERE";
+  constexpr const char* kBack = "VES_ECHO_BACK";
+  const pid_t parent = getpid();
+  const Other other([&] {
+    Bus bus(url);
+    leg_command_t answer{};
+    bus.subscribe(kThere, [&](const std::string&, const void* data, std::uint32_t size) {
+      const auto m = decode<sample_t>(data, size);
+      if (!m) return;
+      answer.header.sequence = m->header.sequence;
+      bus.publish(kBack, answer);
+    });
+    while (getppid() == parent) bus.wait(kPatience);
+  });
+  Bus bus(url);
+  std::int64_t heard = -1;
+  bus.subscribe(kBack, [&](const std::string&, const void* data, std::uint32_t size) {
+    if (const auto m = decode<leg_command_t>(data, size)) heard = m->header.sequence;
+  });
+  sample_t sample{};
+  const auto send = [&](int i) {
+    sample.header.sequence = i;
+    const std::int64_t now = monotonicNow();
+    bus.publish(kThere, sample);
+    return now;
+  };
+  return thereAndBack(bus, 0, times, send, [&] { return heard; });
+}
+
+Latency response(const Experiment& experiment, const std::string& url, int times) {
+  const pid_t parent = getpid();
+  const Other controller([&] {
+    ProcessOptions options;
+    options.url = url;
+    options.lockstep = true;
+    options.start = true;
+    runController(experiment, options, [&](const TickState&) {
+      return getppid() == parent ? Order() : Order{Request::kStop, {}, {}};
+    });
+  });
+  Bus bus(url);
+  const Identity self = Identity::draw();
+  std::int64_t heard = -2;
+  LegCommand command;
+  bus.subscribe(channel::kLegCommand,
+                [&](const std::string&, const void* data, std::uint32_t size) {
+                  const auto m = decode<leg_command_t>(data, size);
+                  const auto legs = m ? fromMessage(*m) : std::nullopt;
+                  if (!legs) return;
+                  command = *legs;
+                  heard = m->header.sequence;
+                });
+  const std::int64_t until = monotonicNow() + 5'000'000'000;
+  while (heard < -1 && monotonicNow() < until) bus.wait(kPatience);
+  if (heard < -1) throw InputError("doctor: the controller does not answer");
+  plant::Plant plant(experiment.plant);
+  const auto send = [&](int i) {
+    if (i > 0) {
+      plant.command(command);
+      plant.advance(i * experiment.controller.period);
+    }
+    const sample_t sample = toMessage(plant.sample(), self, i - 1);
+    const std::int64_t now = monotonicNow();
+    bus.publish(channel::kSample, sample);
+    return now;
+  };
+  return thereAndBack(bus, 0, times, send, [&] { return heard; });
 }
 
 }  // namespace ves

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
+#include "ves/realtime/histogram.hpp"
 #include "ves/realtime/realtime.hpp"
 #include "ves/run/ending.hpp"
 #include "ves/run/flight_record.hpp"
@@ -18,9 +19,30 @@ constexpr std::int64_t kLongestLeap = 100'000'000;  // [-] ticks that a command 
 constexpr int kAnswerTries = 50;                    // [-] before the other side counts as gone
 constexpr std::int64_t kFirstSampleTime = 10'000'000'000;  // [ns]
 
+/// What a running loop tells of its time.
+struct TickTimes {
+  timing_t timing{};
+
+  /// Counts the times of this tick into the histograms.
+  void count() noexcept {
+    const auto into = [](LatencyHistogram& histogram, std::int64_t ns, std::int32_t* bins) {
+      histogram.add(ns);
+      std::copy(histogram.bins().begin(), histogram.bins().end(), bins);
+    };
+    into(late, timing.late_ns, timing.late);
+    into(compute, timing.compute_ns, timing.compute);
+    into(sample_age, timing.sample_age_ns, timing.sample_age);
+    into(sample_to_command, timing.sample_to_command_ns, timing.sample_to_command);
+  }
+
+ private:
+  LatencyHistogram late, compute, sample_age, sample_to_command;
+};
+
 void conduct(const char* who, int priority, bool required) {
   if (!claimRealtime(priority, required))
-    fmt::print(stderr, "{}: no real-time privileges, running at best effort\n", who);
+    fmt::print(stderr,
+               "{}: no real-time privileges, running at best effort; ./ves doctor says why\n", who);
 }
 
 }  // namespace
@@ -83,17 +105,21 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
       const header_t h = header(self, in.tick, in.sample.time);
       const state_t told = toMessage(state, in, h);
       out = toMessage(state.command, h);
+      const leg_command_t logged = out;
+      const bool over = finish(state);
+      if (!over) {
+        // As the command of the last tick that is passed over: the machine goes on to its end.
+        out.header.sequence += state.idle;
+        link.send(out);
+      }
       bus.publish(channel::kState, told);
       flight.keep(told, toMessage(in.sample, {}, in.tick - 1));
       if (log) {
         log->write(channel::kState, told, in.sample.time);
-        log->write(channel::kLegCommand, out, in.sample.time);
+        log->write(channel::kLegCommand, logged, in.sample.time);
       }
-      if (finish(state)) break;
-      // Sent as the command of the last tick that is passed over: the machine goes on to its end.
+      if (over) break;
       in.tick += 1 + state.idle;
-      out.header.sequence = in.tick - 1;
-      link.send(out);
       bus.drain();
     }
     return ending.result(monotonicNow() - start);
@@ -107,17 +133,21 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
     bus.wait(100);
   }
   Ticker ticker(experiment.controller.period);
+  TickTimes times;
   std::int64_t woke = monotonicNow();
   for (;; ++in.tick) {
     in.ran_long = monotonicNow() - woke > experiment.controller.period;
-    in.tick += ticker.wait();
+    const std::int64_t missed = ticker.wait();
+    in.tick += missed;
     woke = monotonicNow();
     bus.drain();
     in.sample = link.sample();
     const std::int64_t sample_time = link.sampleTime();
     in.rival = link.takeRival() || in.rival;
+    const std::int64_t received = monotonicNow();
 
     const TickState& state = platform.tick(in);
+    const std::int64_t ticked = monotonicNow();
 
     const header_t h = header(self, in.tick, woke);
     link.send(toMessage(state.command, h));
@@ -125,12 +155,20 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
     const state_t told = toMessage(state, in, h);
     bus.publish(channel::kState, told);
     flight.keep(told, toMessage(in.sample, {}, -1));
-    timing_t timing;
+    const std::int64_t over = monotonicNow();
+    timing_t& timing = times.timing;
     timing.header = h;
     timing.late_ns = ticker.late();
+    timing.receive_ns = received - woke;
+    timing.tick_ns = ticked - received;
+    timing.send_ns = sent - ticked;
     timing.compute_ns = sent - woke;
+    timing.tell_ns = over - sent;
     timing.sample_age_ns = woke - sample_time;
+    timing.sample_to_command_ns = sent - sample_time;
     timing.missed = ticker.missed();
+    (in.ran_long ? timing.missed_ran_long : timing.missed_woke_late) += missed;
+    times.count();
     bus.publish(channel::kTiming, timing);
     if (finish(state)) break;
   }

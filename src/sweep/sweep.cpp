@@ -104,7 +104,7 @@ std::ptrdiff_t cells(const std::string& line) {
 
 std::string headerOf(const SweepPlan& plan) {
   std::string line = "run";
-  for (const std::string& key : plan.keys()) line += "," + cell(key);
+  for (const std::string& key : plan.keys()) line += fmt::format(",{}", cell(key));
   line += ",ended,first_cause,first_cause_tick";
   for (const char* number : kNumbers) line += fmt::format(",{}", number);
   return line;
@@ -117,7 +117,7 @@ std::string rowOf(const SweepPlan& plan, const SweepOptions& options, std::int64
   std::string row = fmt::format("{}", run);
   for (const std::string& one : plan.overrides(run)) {
     all.push_back(one);
-    row += "," + cell(one.substr(one.find('=') + 1));
+    row += fmt::format(",{}", cell(one.substr(one.find('=') + 1)));
   }
   const std::string rest = std::string(std::size(kNumbers), ',');
   try {

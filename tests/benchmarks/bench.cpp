@@ -1,15 +1,21 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Speed of the hot paths; read as ratios within one run. KDL's fixed-base solver stands beside
-// ours.
+// Speed of the hot paths. KDL's fixed-base solver stands beside ours; table.cpp prints the ratios.
 #include <benchmark/benchmark.h>
+#include <fmt/format.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
+#include <algorithm>
+#include <filesystem>
 #include <kdl/chainidsolver_recursive_newton_euler.hpp>
 
 #include "support/poses.hpp"
 #include "support/robots.hpp"
+#include "ves/realtime/realtime.hpp"
+#include "ves/replay/replay.hpp"
 #include "ves/run/run.hpp"
-#include "ves/srms/modes.hpp"
 
 namespace ves {
 namespace {
@@ -18,14 +24,13 @@ Experiment experiment(const std::string& name) {
   return loadExperiment(test::configDir() + "/scenarios/" + name + ".yaml");
 }
 
-// --- Kinematics
-// -----------------------------------------------------------------------------------
+// Kinematics
 
-/// Legs of random poses of the workspace, with a start `share` of the way out from home.
-void forward(benchmark::State& state, double share) {
+/// Legs of random poses of the whole workspace, with a start `share` of the way out from home.
+void forward(benchmark::State& state, double share, int poses) {
   const Geometry g = test::geometry();
   std::vector<std::pair<Vec6, Transform>> cases;
-  for (const Pose& x : test::poses(4096))
+  for (const Pose& x : test::poses(poses))
     cases.emplace_back(legLengths(g, g.fromHome(x)), g.fromHome(Pose::from(share * x.stacked())));
   std::int64_t iterations = 0, failures = 0;
   std::size_t i = 0;
@@ -40,12 +45,15 @@ void forward(benchmark::State& state, double share) {
       static_cast<double>(iterations) / static_cast<double>(state.iterations());
   state.counters["failures"] = static_cast<double>(failures);
 }
-void ForwardPoseCold(benchmark::State& state) { forward(state, 0.0); }
+void ForwardPoseCold(benchmark::State& state) { forward(state, 0.0, 4096); }
 void ForwardPoseWarm(benchmark::State& state) {
-  forward(state, 0.98);
+  forward(state, 0.98, 4096);
 }  // 2 % off, as peers measure
 BENCHMARK(ForwardPoseCold);
 BENCHMARK(ForwardPoseWarm);
+/// Each once: what counts is the failures.
+void ForwardPoseMillion(benchmark::State& state) { forward(state, 0.98, 1'000'000); }
+BENCHMARK(ForwardPoseMillion)->Iterations(1'000'000)->Repetitions(1);
 
 void InverseKinematics(benchmark::State& state) {
   const Geometry g = test::geometry();
@@ -70,8 +78,7 @@ void ForwardRatesAndAccelerations(benchmark::State& state) {
 }
 BENCHMARK(ForwardRatesAndAccelerations);
 
-// --- Dynamics
-// ---------------------------------------------------------------------------------------
+// Dynamics
 
 void newtonEulerOf(benchmark::State& state, const char* name) {
   const RobotModel robot = test::robot(name).model;
@@ -137,31 +144,102 @@ void AdmittanceStep(benchmark::State& state) {
 }
 BENCHMARK(AdmittanceStep)->Arg(6)->Arg(20)->Arg(132);
 
-// --- Whole
-// -------------------------------------------------------------------------------------------
-
-void ControllerTick(benchmark::State& state) {  // admittance control, PUMA, six modes
+void SafetyChecks(benchmark::State& state) {  // those of pose and lengths
   const Experiment e = experiment("puma_on_table_4_1");
-  TestPlatform platform(e.controller);
-  plant::Plant plant(e.plant);
+  const SafetyLimits& limits = e.controller.safety;
+  const Geometry& g = e.controller.geometry;
+  const JointAxes axes(g);
+  Pose x{{0.1, 0.05, -0.1}, {0.1, -0.1, 0.2}};
+  const Transform X = g.fromHome(x);
+  const Vec6 L = legLengths(g, X), L_last = L - Vec6::Constant(1e-3);
+  const AdcCounts adc{};
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(x);
+    Tripped t;
+    t.require(Check::kMotionLimits, motionLimitsCheck(limits, x));
+    t.require(Check::kActuatorLimits, actuatorLimitsCheck(limits, L));
+    t.require(Check::kJointLimits, axes.check(limits, g, X));
+    t.require(Check::kCollide, collideCheck(limits, g, X));
+    t.require(Check::kConditioning, conditioningCheck(limits, g, X));
+    t.require(Check::kVelocity, velocityCheck(limits, L, L_last, 0.01));
+    t.require(Check::kFlow, flowLimitsCheck(limits, L, L_last, 0.01));
+    t.require(Check::kPositionError, positionErrorCheck(limits, L, L_last, L_last));
+    t.require(Check::kPressure, pressureCheck(limits, adc));
+    t.require(Check::kSensorSaturated, saturationCheck(adc));
+    benchmark::DoNotOptimize(t);
+  }
+}
+BENCHMARK(SafetyChecks);
+
+// Whole
+
+/// A controller in the middle of its admittance segment, and the machine as it is then.
+struct UnderWay {
+  Experiment e = experiment("puma_on_table_4_1");  // PUMA, six modes
+  TestPlatform platform{e.controller};
+  plant::Plant plant{e.plant};
   TickInput in;
-  in.order.request = Request::kStart;
-  for (; in.tick < 700; ++in.tick) {  // into the admittance segment
+
+  UnderWay() {
+    in.order.request = Request::kStart;
+    while (in.tick < 700) step();
+  }
+  void step() {
     in.sample = plant.sample();
     plant.command(platform.tick(in).command);
-    plant.advance((in.tick + 1) * e.controller.period);
+    plant.advance(++in.tick * e.controller.period);
   }
+};
+
+void ControllerTick(benchmark::State& state) {
+  UnderWay run;
   for (auto _ : state) {
-    TestPlatform copy = platform;  // so that the program never ends
+    TestPlatform copy = run.platform;  // so that the program never ends
     for (int k = 0; k < 500; ++k) {
-      ++in.tick;
-      ++in.sample.sequence;
-      benchmark::DoNotOptimize(copy.tick(in));
+      ++run.in.tick;
+      ++run.in.sample.sequence;
+      benchmark::DoNotOptimize(copy.tick(run.in));
     }
   }
   state.SetItemsProcessed(state.iterations() * 500);
 }
-BENCHMARK(ControllerTick)->Unit(benchmark::kMicrosecond);
+BENCHMARK(ControllerTick);
+
+/// Each tick by itself, in the closed loop: median and 99.9th percentile, the clock's reading
+/// included.
+void ControllerTickTail(benchmark::State& state) {
+  std::vector<double> all;
+  for (auto _ : state) {
+    UnderWay run;
+    for (int i = 0; i < 1000; ++i) {
+      run.in.sample = run.plant.sample();
+      const std::int64_t before = monotonicNow();
+      const TickState& told = run.platform.tick(run.in);
+      all.push_back(static_cast<double>(monotonicNow() - before));
+      run.plant.command(told.command);
+      run.plant.advance(++run.in.tick * run.e.controller.period);
+    }
+  }
+  std::sort(all.begin(), all.end());
+  const auto at = [&](double share) {
+    return all[static_cast<std::size_t>(share * static_cast<double>(all.size() - 1))];
+  };
+  state.counters["median_us"] = 1e-3 * at(0.5);
+  state.counters["p999_us"] = 1e-3 * at(0.999);
+  state.counters["p999_over_median"] = at(0.999) / at(0.5);
+}
+BENCHMARK(ControllerTickTail)->Iterations(20)->Unit(benchmark::kMillisecond);
+
+void LegSlavePeriod(benchmark::State& state) {  // 1023 us of one leg
+  plant::LegSlave leg({}, 8000);
+  std::int32_t count = 8000;
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(count);
+    for (int i = 0; i < plant::kReadingsPerUpdate; ++i) leg.read(count, 8010);
+    benchmark::DoNotOptimize(leg.code());
+  }
+}
+BENCHMARK(LegSlavePeriod);
 
 void PlantPeriod(benchmark::State& state) {  // 10 ms of the machine with a PUMA
   const Experiment e = experiment("puma_on_table_4_1");
@@ -172,17 +250,72 @@ void PlantPeriod(benchmark::State& state) {  // 10 ms of the machine with a PUMA
     benchmark::DoNotOptimize(plant.sample());
   }
 }
-BENCHMARK(PlantPeriod)->Unit(benchmark::kMicrosecond);
+BENCHMARK(PlantPeriod);
 
 void LockstepDemo(benchmark::State& state) {
   const Experiment e = experiment("puma_on_table_4_1");
   double simulated = 0.0;
-  for (auto _ : state) simulated += runLockstep(e, nullptr, nullptr).simulated;
+  std::int64_t ticks = 0;
+  for (auto _ : state) {
+    const RunResult result = runLockstep(e, nullptr, nullptr);
+    simulated += result.simulated;
+    ticks += result.ticks;
+  }
   state.counters["x_real_time"] = benchmark::Counter(simulated, benchmark::Counter::kIsRate);
+  state.counters["ticks_per_s"] =
+      benchmark::Counter(static_cast<double>(ticks), benchmark::Counter::kIsRate);
 }
 BENCHMARK(LockstepDemo)->Unit(benchmark::kMillisecond);
 
+/// The same with the plant as another process, over LCM.
+void LockstepDemoOverTheBus(benchmark::State& state) {
+  const Experiment e = experiment("puma_on_table_4_1");
+  ProcessOptions options;
+  options.lockstep = true;
+  options.start = true;
+  if (!busWorks(options.url)) {
+    state.SkipWithError("no bus: run as root, or see ./ves doctor");
+    return;
+  }
+  const pid_t parent = getpid(), plant = fork();
+  if (plant == 0) {
+    runPlant(e, options, [&] { return getppid() != parent; });
+    _exit(0);
+  }
+  double simulated = 0.0;
+  std::int64_t ticks = 0;
+  for (auto _ : state) {
+    const RunResult result = runController(e, options, [](const TickState&) { return Order(); });
+    simulated += result.simulated;
+    ticks += result.ticks;
+  }
+  kill(plant, SIGTERM);
+  waitpid(plant, nullptr, 0);
+  state.counters["x_real_time"] = benchmark::Counter(simulated, benchmark::Counter::kIsRate);
+  state.counters["ticks_per_s"] =
+      benchmark::Counter(static_cast<double>(ticks), benchmark::Counter::kIsRate);
+}
+BENCHMARK(LockstepDemoOverTheBus)->UseRealTime()->Iterations(1)->Unit(benchmark::kMillisecond);
+
+void ReplayDemo(benchmark::State& state) {
+  const std::string log =
+      std::filesystem::temp_directory_path() / fmt::format("ves-bench-{}.lcmlog", getpid());
+  {
+    LogWriter writer(log);
+    runLockstep(experiment("puma_on_table_4_1"), &writer, nullptr);
+  }
+  std::int64_t ticks = 0, different = 0;
+  for (auto _ : state) {
+    const ReplayResult result = replay(log, {}, [](const TickState&) {});
+    ticks += result.ticks;
+    different += result.different;
+  }
+  std::filesystem::remove(log);
+  state.counters["ticks_per_s"] =
+      benchmark::Counter(static_cast<double>(ticks), benchmark::Counter::kIsRate);
+  state.counters["different"] = static_cast<double>(different);
+}
+BENCHMARK(ReplayDemo)->Unit(benchmark::kMillisecond);
+
 }  // namespace
 }  // namespace ves
-
-BENCHMARK_MAIN();

@@ -26,7 +26,8 @@ class Ticker {
   std::int64_t missed_ = 0;
 };
 
-/// Real-time conduct of this process: SCHED_FIFO at `priority`, memory locked. When `required`,
+/// Real-time conduct of this process: SCHED_FIFO at `priority`, memory locked, stack touched. When
+/// `required`,
 /// throws InputError with the reason; otherwise says whether both were granted.
 bool claimRealtime(int priority, bool required);
 

@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "ves/run/run.hpp"
+
 namespace ves {
 
 /// Median and tail of a latency. [s]
@@ -39,5 +41,10 @@ std::optional<Latency> cyclictest(double seconds, std::int64_t period, bool real
 /// From sending a sample_t to hearing a leg_command_t that another process answers with, over LCM
 /// and without any work in between. Throws InputError where the bus does not work.
 Latency echo(const std::string& url, int times);
+
+/// From sending a sample_t to hearing our controller's leg_command_t for it: the echo, with the
+/// work in between. In lockstep, so that no waiting for a tick is in it. Throws InputError where
+/// the bus does not work.
+Latency response(const Experiment& experiment, const std::string& url, int times);
 
 }  // namespace ves
