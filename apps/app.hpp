@@ -56,7 +56,7 @@ struct Options {
   std::string scenario;
   std::vector<std::string> overrides;
   std::int64_t seed = -1;
-  std::string calibration, masses;
+  std::string calibration, masses, servo;
   bool force = false;
   bool private_bus = false;
   ProcessOptions process;
@@ -68,6 +68,7 @@ struct Options {
     cli.add_option("--seed", seed, "of the plant's noise")->check(CLI::Range(0, INT32_MAX));
     cli.add_option("--calibration", calibration, "file that a calibration has left");
     cli.add_option("--masses", masses, "file that an identification has left, for the controller");
+    cli.add_option("--servo", servo, "file that a servo identification has left, for the controller");
   }
   void addForce(CLI::App& cli) {
     cli.add_flag("--force", force, "admittance control even where it would diverge");
@@ -83,7 +84,7 @@ struct Options {
     std::vector<std::string> all = overrides;
     if (seed >= 0) all.push_back(fmt::format("seed={}", seed));
     if (force) all.push_back("controller.force=true");
-    return loadExperiment(findScenario(scenario, configFolder()), all, calibration, masses);
+    return loadExperiment(findScenario(scenario, configFolder()), all, calibration, masses, servo);
   }
 };
 

@@ -10,6 +10,7 @@
 
 #include "ves/config/base.hpp"
 #include "ves/config/masses.hpp"
+#include "ves/config/servo.hpp"
 #include "ves/config/urdf.hpp"
 
 namespace ves {
@@ -77,7 +78,7 @@ struct Legs {
 
 Legs readLegs(Section s) {
   Legs legs;
-  legs.gains.K_P = static_cast<int>(s.integer("K_P", 0, 1'000'000));
+  legs.gains.K_P = static_cast<int>(s.integer("K_P", 1, 1'000'000));
   legs.gains.K_D = static_cast<int>(s.integer("K_D", 0, 1'000'000));
   constexpr double kPerMilliampere = 1e3;
   legs.actuator.gain_extend =
@@ -104,6 +105,44 @@ Legs readLegs(Section s) {
   legs.codec.offset.setConstant(legs.transducer.offset);
   legs.codec.scale.setConstant(legs.transducer.scale);
   return legs;
+}
+
+/// What the legs' numbers make of the servos.
+ServoModel nominalServo(const Legs& legs, double sensor_cutoff) {
+  using plant::LegSlave;
+  ServoModel s;
+  constexpr double kFractional = 256.0;  // eight bits of U, (2.7a)
+  const double current =                 // [A] at the D/A converter's full scale
+      LegSlave::kFullScale * LegSlave::kVoltsPerDigit * LegSlave::kAmperesPerVolt;
+  const double digits_per_count = legs.gains.K_P / kFractional;
+  s.rail = LegSlave::kFullScale / digits_per_count * legs.transducer.scale;
+  s.extend.setConstant(legs.actuator.gain_extend * current / s.rail);
+  s.retract.setConstant(legs.actuator.gain_retract * current / s.rail);
+  s.tau.setConstant(legs.actuator.tau);
+  s.update = static_cast<double>(plant::kUpdatePeriod) * kSecondPerNanosecond;
+  constexpr int kSpan = 4;  // [-] updates, of X(k) - X(k-4)
+  s.derivative = kSpan * s.update * legs.gains.K_D / legs.gains.K_P;
+  s.reading_age = 0.5 * static_cast<double>(plant::kTransducerPeriod) * kSecondPerNanosecond;
+  s.sensor_cutoff = sensor_cutoff;
+  s.readings = legs.codec;
+  return s;
+}
+
+/// What goes beyond the report; without the key all of it is off.
+Compensation readCompensation(Section& controller) {
+  Compensation c;
+  c.ramp = 0.5;
+  if (!controller.has("compensation")) return c;
+  Section s = controller.section("compensation");
+  c.feed_forward = s.flag("feed_forward");
+  c.observer = s.flag("observer");
+  c.inertia = s.flag("inertia");
+  if (c.inertia && !c.observer) s.fail("inertia", "needs the observer, want 'observer: true'");
+  c.mass_update = static_cast<int>(s.integer("mass_update_ticks", 1, 1'000'000));
+  c.ramp = s.number("ramp_s", 0.01, 100.0);
+  c.jitter = s.number("reading_jitter_s", 0.0, 0.1);
+  s.finish();
+  return c;
 }
 
 struct Sensor {
@@ -400,6 +439,7 @@ Experiment build(const Value& document) {
   c.arming_samples = static_cast<int>(controller.integer("arming_samples", 1, 10'000));
   if (controller.has("force")) c.forced = controller.flag("force");
   c.tare_ramp = controller.number("tare_ramp_s", 0.01, 100.0);
+  c.compensation = readCompensation(controller);
   Section still = controller.section("still");
   c.stillness.leg_counts = static_cast<int>(still.integer("leg_counts", 0, 1000));
   c.stillness.joint = still.number("joint_rad_or_m", 0.0, 1.0);
@@ -419,6 +459,9 @@ Experiment build(const Value& document) {
   const Sensor sensor = readSensor(root.section("sensor"));
   c.sensor = {sensor.model.S_proc().inverse(), sensor.X_PS};
   c.stillness.bias = bias / sensor.model.volts_per_count;
+  c.servo = nominalServo(legs, sensor.model.cutoff);
+  c.servo.jitter = c.compensation.jitter;
+  if (root.has("servo")) c.servo = withRecord(c.servo, readServo(root.section("servo")));
   c.safety = readSafety(root.section("safety"), sensor.model.volts_per_count);
   c.admittance = readBase(root.section("base")).modes;
 
@@ -494,10 +537,11 @@ Experiment build(const Value& document) {
 Experiment loadExperiment(const std::filesystem::path& file,
                           const std::vector<std::string>& overrides,
                           const std::filesystem::path& calibration,
-                          const std::filesystem::path& masses) {
+                          const std::filesystem::path& masses, const std::filesystem::path& servo) {
   Value document = loadDocument(file);
   if (!calibration.empty()) document.put("calibration", loadDocument(calibration));
   if (!masses.empty()) document.put("masses", loadDocument(masses));
+  if (!servo.empty()) document.put("servo", loadDocument(servo));
   for (const std::string& assignment : overrides) override(document, assignment);
   return build(document);
 }

@@ -62,11 +62,11 @@ bool velocityCheck(const SafetyLimits& limits, const Vec6& L, const Vec6& L_last
   return (L - L_last).cwiseAbs().maxCoeff<Eigen::PropagateNaN>() <= limits.leg_velocity * period;
 }
 
-bool positionErrorCheck(const SafetyLimits& limits, const Vec6& L_commanded, const Vec6& L_measured,
+bool positionErrorCheck(const SafetyLimits& limits, const Vec6& L_expected, const Vec6& L_measured,
                         const Vec6& speed) noexcept {
   bool near = true;
   for (int i = 0; i < kLegs; ++i) {
-    const double error = std::abs(L_commanded(i) - L_measured(i));
+    const double error = std::abs(L_expected(i) - L_measured(i));
     near = near && error <= limits.position_error &&
            error <= limits.position_error_still + limits.position_error_lag * speed(i);
   }

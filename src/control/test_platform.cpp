@@ -23,6 +23,13 @@ bool forbids(Tripped tripped) {
   return (tripped.bits() & ~waiting.bits()) != 0;
 }
 
+/// [s] after its own state that the admittance model answers: the wrench it is given is late by the
+/// sensor's filter, and held for a period where it should be known along it.
+double ahead(const ControllerConfig& config, double period) {
+  if (!config.compensation.inertia) return 0.0;
+  return M_SQRT2 / config.servo.sensor_cutoff + 0.5 * period;
+}
+
 double brakeTime(const Vec6& v, const ControllerConfig::Braking& braking) {
   return std::max(v.head<3>().norm() / braking.translation, v.tail<3>().norm() / braking.rotation);
 }
@@ -46,7 +53,12 @@ TestPlatform::TestPlatform(const ControllerConfig& config)
     : config_(config),
       period_(static_cast<double>(config.period) * kSecondPerNanosecond),
       joint_axes_(config.geometry),
-      admittance_(config.admittance, period_),
+      carried_(carried(config.payload)),
+      X_PL0_(config.payload.X_PL0()),
+      admittance_(config.admittance, period_, ahead(config, period_)),
+      servo_(config.servo, period_),
+      weight_(config.servo.sensor_cutoff),
+      weight_step_(weight_.prepare(period_)),
       S_proc_(config.sensor.C_proc.inverse()),
       calibration_(config.stillness),
       X_IP_measured_(config.geometry.fromHome({})) {
@@ -85,7 +97,10 @@ const TickState& TestPlatform::tick(const TickInput& input) noexcept {
     state_.legs = step.legs;
     state_.command.engaged = state_.phase != Phase::kDisarmed;
     state_.command.segment = state_.segment;
-    if (step.legs.L.allFinite()) state_.command.counts = legCounts(config_.legs, step.legs.L);
+    if (step.legs.L.allFinite()) {
+      state_.reference = reference(step.legs);
+      state_.command.counts = legCounts(config_.legs, state_.reference);
+    }
   }
   state_.command.park = state_.phase != Phase::kStopped && state_.phase != Phase::kStopping;
   leg_speed_.step(state_.legs.L_dot, period_);
@@ -115,22 +130,68 @@ void TestPlatform::readSample(const TickInput& in) noexcept {
   if (!follow) readings_.reset();
   if (fresh || !follow)
     state_.L_measured = readings_.take(L, leg_speed_.speed(), waited, config_.safety.reading_jump);
+  if (follow)
+    observe(1 + missed, fresh);
+  else
+    servo_.reset(state_.L_measured);
   const ForwardSolution forward = forwardPose(config_.geometry, state_.L_measured, X_IP_measured_);
   legs_solved_ = forward.ok();
   if (legs_solved_) X_IP_measured_ = forward.X_IP;
   state_.measured = config_.geometry.toHome(X_IP_measured_);
 }
 
+/// The servo model, brought to this tick.
+void TestPlatform::observe(std::int64_t periods, bool fresh) noexcept {
+  const Compensation& c = config_.compensation;
+  const double change = period_ / c.ramp;
+  state_.compensated = c.feed_forward || c.inertia ? std::min(1.0, state_.compensated + change)
+                                                   : std::max(0.0, state_.compensated - change);
+  if (!c.inertia) return;
+  constexpr std::int64_t kMost = 10;  // [-] periods; after more it has come to rest
+  const Vec6 sent = legLengths(config_.legs, state_.command.counts);
+  for (std::int64_t i = 0; i < std::min(periods, kMost); ++i) servo_.advance(sent);
+  if (fresh) servo_.correct(state_.L_measured);
+}
+
 void TestPlatform::measureWrench(const Sample& sample) noexcept {
   // The measured attitude: the commanded one leads it by the servo's lag, and the difference would
   // pass as a wrench of the robot's weight.
   const Mat3& R_IP = X_IP_measured_.R;
-  load_ = S_proc_ * staticWrench(config_.payload, sample.q, R_IP, config_.gravity).stacked();
+  const Wrench weight_S = staticWrench(config_.payload, sample.q, R_IP, config_.gravity);
+  load_ = S_proc_ * weight_S.stacked();
   tare(sample);
   state_.total = forceMeasurement(config_.sensor, state_.bias, sample.adc, R_IP);
-  state_.fixed = gravityCompensation(config_.payload, sample.q, R_IP, config_.gravity);
-  state_.dynamic = state_.total - state_.fixed;
+  state_.fixed = rotate(R_IP, transfer(config_.payload.X_PS, felt(weight_S)));
+  state_.inertial = robotInertia(sample);
+  state_.dynamic = state_.total - state_.fixed + state_.inertial;
   if (state_.age == 0) frozen_.take(sample.adc, load_);
+}
+
+/// The weight as the sensor's filter shows it: a turn of the robot moves it at once.
+Wrench TestPlatform::felt(const Wrench& weight_S) noexcept {
+  const Vec6 weight = weight_S.stacked();
+  if (!config_.compensation.inertia || !weight.allFinite()) return weight_S;
+  if (state_.command.engaged)
+    weight_.advance(weight_step_, weight.array());
+  else
+    weight_.settle(weight.array());
+  return Wrench::from(weight + state_.compensated * (weight_.output().matrix() - weight));
+}
+
+/// What it takes to move the robot, its joints locked, as the platform moves by the servo model:
+/// the sensor's filter included, as it is in the wrench.
+Wrench TestPlatform::robotInertia(const Sample& sample) noexcept {
+  const Compensation& c = config_.compensation;
+  if (!c.inertia || !state_.command.engaged) return {};
+  if (state_.count % c.mass_update == 0)
+    robot_P_ = combine(RigidBody{}, X_PL0_, locked(carried_, sample.q));
+  M_1_ = state_.compensated * spatialMass(turned(X_IP_measured_.R, robot_P_));
+  BodyMotion P;
+  const LegMotion legs{state_.L_measured, servo_.velocity(), servo_.filteredAcceleration()};
+  if (!forwardMotion(config_.geometry, X_IP_measured_, legs, P)) return {};
+  Vec6 acceleration;
+  acceleration << P.a, P.alpha;
+  return Wrench::from(M_1_ * acceleration);
 }
 
 Refusal TestPlatform::obey(const Order& order) noexcept {
@@ -240,6 +301,7 @@ void TestPlatform::choosePhase() noexcept {
       if (forbids(state_.tripped)) wish_ = Request::kNone;
       if (wish_ != Request::kNone && fresh_ticks_ > config_.arming_samples && !state_.tripped.any())
         state_.phase = Phase::kArmed;
+      state_.compensated = 0.0;
       break;
     case Phase::kArmed:
       if (wish_ == Request::kStart) beginProgram(0);
@@ -431,7 +493,7 @@ PathPoint<6> TestPlatform::nextMotion(const Sample& sample) noexcept {
       // A wrench that is no number must not enter the model's state; the finite check stops the
       // run.
       if (state_.dynamic.stacked().allFinite()) {
-        admittance_.step(state_.dynamic);
+        admittance_.step(state_.dynamic, M_1_, state_.compensated);
         envelope();
         const double floor = config_.safety.growth_floor;
         oscillation_.take(admittance_.energy(),
@@ -549,7 +611,6 @@ TestPlatform::Step TestPlatform::check(const TickInput& in,
   // Before the legs follow, the last command is where they are.
   const bool following = state_.command.engaged;
   const Vec6& L_last = following ? state_.legs.L : legs.L;
-  const Vec6& L_in_force = following ? state_.legs.L : state_.L_measured;
 
   Tripped t = pathChecks(P.X, Pose::from(next.x), legs.L) | stepChecks(legs.L, L_last, period_);
   t.require(Check::kPanicButton, in.sample.switches & kPanicButtonClosed);
@@ -562,13 +623,34 @@ TestPlatform::Step TestPlatform::check(const TickInput& in,
   t.require(Check::kLegReading, readings_.good());
   t.require(Check::kForwardKinematics, legs_solved_);
   t.require(Check::kPositionError,
-            positionErrorCheck(limits, L_in_force, state_.L_measured, leg_speed_.speed()));
+            positionErrorCheck(limits, following ? expectedLengths() : state_.L_measured,
+                               state_.L_measured, leg_speed_.speed()));
   t.require(Check::kPressure, pressureCheck(limits, in.sample.adc));
   t.require(Check::kSensorSaturated, saturationCheck(in.sample.adc));
   t.require(Check::kSensorFrozen, frozen_.good(limits));
   t.require(Check::kOscillation, oscillation_.good(limits));
   t.require(Check::kRival, !in.rival);
   return {next, legs, t};
+}
+
+/// Where the legs should be at this tick: the last command's, or, when the servos' lag is taken
+/// out, that command brought to now.
+Vec6 TestPlatform::expectedLengths() const noexcept {
+  if (!config_.compensation.feed_forward || state_.phase == Phase::kStopped) return state_.legs.L;
+  const double since = commandsNextState() ? 0.0 : period_;
+  return state_.legs.L + state_.compensated * since * state_.legs.L_dot;
+}
+
+/// Leg communication's lengths: the legs', or what takes the legs there. Inside the limits in any
+/// case: should no further command come, the legs end where they were told.
+Vec6 TestPlatform::reference(const LegMotion& legs) const noexcept {
+  const Compensation& c = config_.compensation;
+  if (!c.any()) return legs.L;
+  const double lead = commandsNextState() ? period_ : 0.0;
+  Vec6 L = legs.L;
+  if (c.feed_forward) L = feedForward(config_.servo, legs, lead, period_, state_.compensated);
+  if (c.observer && state_.command.engaged) L += state_.compensated * servo_.rounding(legs.L_dot);
+  return L.cwiseMax(config_.safety.leg_min).cwiseMin(config_.safety.leg_max);
 }
 
 /// Latches; then brakes, or holds the last checked lengths from now on.
@@ -593,6 +675,8 @@ void TestPlatform::freeze() noexcept {
   oscillation_.reset();
   state_.phase = Phase::kStopped;
   state_.motion = atRest(state_.motion.x);
+  if (config_.compensation.any() && state_.command.engaged)
+    state_.legs.L = state_.reference;  // where the legs, on their way, will end
   state_.legs.L_dot.setZero();
   state_.legs.L_ddot.setZero();
 }

@@ -37,6 +37,7 @@ void forEachField(const state_t& m, F f) {
   f("age", -1, m.age);
   list("total", m.total);
   list("fixed", m.fixed);
+  list("inertial", m.inertial);
   list("dynamic", m.dynamic);
   list("x", m.x);
   list("x_dot", m.x_dot);
@@ -45,6 +46,8 @@ void forEachField(const state_t& m, F f) {
   list("leg", m.leg);
   list("leg_dot", m.leg_dot);
   list("leg_ddot", m.leg_ddot);
+  f("compensated", -1, m.compensated);
+  list("reference", m.reference);
   list("leg_measured", m.leg_measured);
   list("x_measured", m.x_measured);
   list("bias", m.bias);

@@ -96,10 +96,12 @@ std::vector<Column> columns(const Experiment& experiment) {
         [=](const Row& r) { return r.has_truth ? r.truth.x[i] : NAN; });
   addWrench("total", &state_t::total);
   addWrench("static", &state_t::fixed);
+  addWrench("inertial", &state_t::inertial);
   addWrench("dynamic", &state_t::dynamic);
   addLegs("commanded", "m", &state_t::leg);
   addLegs("commanded_rate", "m_per_s", &state_t::leg_dot);
   addLegs("commanded_acceleration", "m_per_s2", &state_t::leg_ddot);
+  addLegs("reference", "m", &state_t::reference);
   addLegs("measured", "m", &state_t::leg_measured);
   for (int i = 0; i < static_cast<int>(experiment.joint_names.size()); ++i)
     add(fmt::format(

@@ -89,6 +89,7 @@ state_t toMessage(const TickState& state, const TickInput& in, const header_t& h
   m.age = state.age;
   put(state.total.stacked(), m.total);
   put(state.fixed.stacked(), m.fixed);
+  put(state.inertial.stacked(), m.inertial);
   put(state.dynamic.stacked(), m.dynamic);
   put(state.motion.x, m.x);
   put(state.motion.x_dot, m.x_dot);
@@ -97,6 +98,8 @@ state_t toMessage(const TickState& state, const TickInput& in, const header_t& h
   put(state.legs.L, m.leg);
   put(state.legs.L_dot, m.leg_dot);
   put(state.legs.L_ddot, m.leg_ddot);
+  m.compensated = state.compensated;
+  put(state.reference, m.reference);
   put(state.L_measured, m.leg_measured);
   put(state.measured.stacked(), m.x_measured);
   put(state.bias, m.bias);

@@ -31,12 +31,13 @@ struct Experiment {
   std::string hash;      // of `resolved`
 };
 
-/// Reads a scenario file; `overrides` are "key.path=value"; `calibration` and `masses` are files
-/// that a calibration and an identification have left, or empty. Throws InputError.
+/// Reads a scenario file; `overrides` are "key.path=value"; `calibration`, `masses` and `servo` are
+/// files that a calibration and identifications have left, or empty. Throws InputError.
 Experiment loadExperiment(const std::filesystem::path& file,
                           const std::vector<std::string>& overrides = {},
                           const std::filesystem::path& calibration = {},
-                          const std::filesystem::path& masses = {});
+                          const std::filesystem::path& masses = {},
+                          const std::filesystem::path& servo = {});
 
 /// Reads back what Experiment::resolved holds; `name` stands for a file name in messages.
 Experiment parseExperiment(const std::string& resolved, const std::string& name);

@@ -26,21 +26,29 @@ class AdmittanceModel {
  public:
   /// Discretises for the period [s]: mode by mode (D.5), or, when damping couples the modes, all
   /// of them in one state space. Requires at most kMaxModes modes, kMaxCoupledModes if coupled.
-  AdmittanceModel(const ModalModel& model, double period);
+  /// `ahead` [s]: motion() is so much later than the step's end, the wrench held.
+  AdmittanceModel(const ModalModel& model, double period, double ahead = 0.0);
 
   /// At rest at x. What the modes cannot express of x stays as a constant offset.
   void reset(const Vec6& x) noexcept;
 
   /// (C.6): the state one period after W began to act.
-  void step(const Wrench& F_Po_I) noexcept;
+  void step(const Wrench& F_Po_I) noexcept { step(F_Po_I, Mat6::Zero(), 0.0); }
+
+  /// The same with a rigid body M_1 on the base [M_1] [a; alpha], whose inertia is not in F_Po_I:
+  /// the left-hand side of (3.11). Its reaction is held over the step, that of the base's mean
+  /// acceleration a over the step, which both determine:
+  ///   a T = Phi (eta'(free) - eta') + Phi Gamma_2 Phi^T (F - M_1 a),
+  /// six equations whatever the number of modes. `share` [-] of `ahead` counts.
+  void step(const Wrench& F_Po_I, const Mat6& M_1, double share) noexcept;
 
   /// Takes back all but `share` of the last step, and of the rate it led to: all modes alike, so
   /// the path stays and only the motion along it is slowed.
   void slow(double share) noexcept;
 
   /// [J] the modes are mass-normalised.
-  double kineticEnergy() const noexcept { return 0.5 * eta_dot_.squaredNorm(); }
-  double energy() const noexcept { return kineticEnergy() + 0.5 * k_.dot(eta_.cwiseAbs2()); }
+  double kineticEnergy() const noexcept { return 0.5 * now_.eta_dot.squaredNorm(); }
+  double energy() const noexcept { return kineticEnergy() + 0.5 * k_.dot(now_.eta.cwiseAbs2()); }
 
   /// (C.7): position, velocity, acceleration at the last step's end.
   const PathPoint<6>& motion() const noexcept { return motion_; }
@@ -56,20 +64,32 @@ class AdmittanceModel {
   using Square =
       Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kCoupledStates, kCoupledStates>;
 
-  void stepModes(const Vector<kMaxModes>& u) noexcept;
-  void stepCoupled(const Vector<kMaxModes>& u) noexcept;
+  /// Exact over one length of time.
+  struct Hold {
+    Eigen::Array<double, 6, Eigen::Dynamic, 0, 6, kMaxModes> modes;  // a mode's Phi (4), Gamma (2)
+    Square Phi, Gamma;                                               // when coupled
+  };
+  Hold hold(const ModalModel& model, double dt) const;
+  struct Modes {
+    Vector<kMaxModes> eta, eta_dot;
+  };
+  /// From `from`, `u` held.
+  Modes advance(const Hold& hold, const Modes& from, const Vector<kMaxModes>& u) const noexcept;
+  /// (C.7).
+  PathPoint<6> at(const Modes& modes, const Vector<kMaxModes>& u) const noexcept;
 
   Matrix<6, 6, kMaxModes> Phi_;
   Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::RowMajor, kMaxModes, 6> Phi_pinv_;
   Vector<kMaxModes> k_;  // [1/s^2]
   Vector<kMaxModes> c_;  // [1/s] diagonal of the damping
   double period_ = 0.0;  // [s]
+  double ahead_ = 0.0;   // [s]
   bool coupled_ = false;
-  Eigen::Array<double, 6, Eigen::Dynamic, 0, 6, kMaxModes> hold_;  // a mode's Phi (4), Gamma (2)
-  Square Phi_coupled_, Gamma_coupled_;                             // when coupled
-  Square damping_;                                                 // when coupled
-  Vector<kMaxModes> eta_, eta_dot_;
-  Vector<kMaxModes> eta_before_, eta_dot_before_;  // the last step
+  Square damping_;  // when coupled
+  Hold step_, ahead_hold_;
+  Mat6 rate_per_wrench_;  // Phi Gamma_2 Phi^T
+  Modes now_, before_;    // before the last step
+  PathPoint<6> motion_before_;
   Vec6 offset_ = Vec6::Zero();
   PathPoint<6> motion_;
 };

@@ -109,9 +109,10 @@ struct SafetyLimits {
 /// Successive commanded lengths differ by no more than leg_velocity allows in one period.
 bool velocityCheck(const SafetyLimits&, const Vec6& L, const Vec6& L_last, double period) noexcept;
 
-/// The measured length is near the commanded one; the servo lags, so the more speed [m/s] a leg has
-/// had lately, the farther behind it may be.
-bool positionErrorCheck(const SafetyLimits&, const Vec6& L_commanded, const Vec6& L_measured,
+/// The measured length is near where the leg should be, which is the commanded one unless the
+/// servo's lag is taken out (TestPlatform::expectedLengths); the servo lags, so the more speed
+/// [m/s] a leg has had lately, the farther behind it may be.
+bool positionErrorCheck(const SafetyLimits&, const Vec6& L_expected, const Vec6& L_measured,
                         const Vec6& speed) noexcept;
 
 /// The pressure's reading is between its limits.

@@ -31,6 +31,7 @@
 #include "ves/control/leg_communication.hpp"
 #include "ves/control/monitors.hpp"
 #include "ves/control/program.hpp"
+#include "ves/control/servo.hpp"
 
 namespace ves {
 
@@ -46,6 +47,18 @@ enum class Phase : std::int32_t {
 
 std::string_view name(Phase phase) noexcept;
 
+/// What goes beyond the report (control/servo.hpp); all off: as published.
+struct Compensation {
+  bool feed_forward = false;  // the servos' lag taken out of the reference
+  bool observer = false;      // the servo model beside the servos: lengths below a count
+  bool inertia = false;       // the robot's inertia taken out of the wrench, and into the base
+  int mass_update = 1;        // [-] ticks for which the robot's locked mass is kept
+  double ramp = 0.5;          // [s] over which they come in, and go out
+  double jitter = 0.0;        // [s] by which the time of a leg's reading may be wrong
+
+  bool any() const noexcept { return feed_forward || observer; }
+};
+
 struct ControllerConfig {
   std::int64_t period = 10'000'000;  // [ns]
   Geometry geometry;
@@ -55,6 +68,8 @@ struct ControllerConfig {
   Vec3 gravity = {0.0, 0.0, -9.81};  // [m/s^2] g_I
   ModalModel admittance;
   LegCodec legs;
+  ServoModel servo;  // as the controller believes it to be
+  Compensation compensation;
   SafetyLimits safety;
   Program program;
   RecordedPath path;              // of its path segments
@@ -95,9 +110,12 @@ struct TickState {
   std::int64_t idle = 0;                   // [-] ticks to come of which nothing is expected
   std::int32_t age = 0;                    // [-] ticks since the sample was new
   Wrench total, fixed, dynamic;    // F_Po_I measured; of gravity (the report's static); difference
+  Wrench inertial;                 // what the robot's locked mass takes, left out of dynamic
+  double compensated = 0.0;        // [-] share of the compensation that is in
   PathPoint<6> motion;             // commanded coordinates about home, rates, accelerations
   Vec6 due = Vec6::Zero();         // coordinates that the platform should have at this very tick
   LegMotion legs;                  // commanded
+  Vec6 reference = Vec6::Zero();   // [m] what the servos are told, so that the legs go there
   Vec6 L_measured = Vec6::Zero();  // [m]
   Pose measured;                   // about home, from L_measured
   Vec6 bias = Vec6::Zero();        // [count]
@@ -131,7 +149,12 @@ class TestPlatform {
 
  private:
   void readSample(const TickInput& in) noexcept;
+  void observe(std::int64_t periods, bool fresh) noexcept;
   void measureWrench(const Sample& sample) noexcept;
+  Wrench felt(const Wrench& weight_S) noexcept;
+  Wrench robotInertia(const Sample& sample) noexcept;
+  Vec6 expectedLengths() const noexcept;
+  Vec6 reference(const LegMotion& legs) const noexcept;
   Refusal obey(const Order& order) noexcept;
   Refusal accept(const Segment& segment) noexcept;
   Refusal refusesAdmittance() const noexcept;
@@ -173,8 +196,15 @@ class TestPlatform {
   ControllerConfig config_;
   double period_;  // [s]
   JointAxes joint_axes_;
+  RobotModel carried_;
+  Transform X_PL0_;
   AdmittanceModel admittance_;
-  Mat6 S_proc_;  // [count per N | N m]
+  ServoObserver servo_;
+  Butterworth2<6> weight_;  // as the wrench's filter shows it
+  Butterworth2<6>::Step weight_step_;
+  RigidBody robot_P_;        // its joints locked
+  Mat6 M_1_ = Mat6::Zero();  // of it, about Po in I
+  Mat6 S_proc_;              // [count per N | N m]
   Calibration calibration_;
   LegSpeed leg_speed_;
   LegReadings readings_;

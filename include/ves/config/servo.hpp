@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// The file that a servo identification leaves: what the controller believes of the six servos,
+// instead of the numbers of the legs' data sheet.
+#pragma once
+
+#include <string>
+
+#include "ves/config/document.hpp"
+#include "ves/control/servo.hpp"
+
+namespace ves {
+
+struct ServoRecord {
+  std::int64_t date = 0;  // [s] since 1970, UTC
+  ServoModel servo;       // extend, retract, tau, delay
+  ServoModel deviation;   // standard, of the same
+};
+
+/// YAML, as readServo() takes it.
+std::string write(const ServoRecord& record);
+
+/// Throws InputError.
+ServoRecord readServo(Section section);
+
+/// `nominal` with what the record has found.
+ServoModel withRecord(ServoModel nominal, const ServoRecord& record);
+
+}  // namespace ves
