@@ -61,10 +61,21 @@ const Parameter kParameters[] = {
      [](Loop& l, const Loop& o, double v) {
        l.robot_P.mass = v * o.robot_P.mass;
        l.robot_P.I_Bcm_B = v * o.robot_P.I_Bcm_B;
+       l.believed.robot_P = l.robot_P;
+     }},
+    {"mass_error", "robot's inertia, times what the controller believes", 0.0, 100.0,
+     [](Loop& l, const Loop& o, double v) {
+       l.robot_P.mass = v * o.robot_P.mass;
+       l.robot_P.I_Bcm_B = v * o.robot_P.I_Bcm_B;
      }},
     {"rate", "controller rate [Hz]", 1.0, 1000.0,
      [](Loop& l, const Loop&, double v) { l.period = 1.0 / v; }},
     {"K_P", "K_P, times its own", 0.0, 100.0,
+     [](Loop& l, const Loop& o, double v) {
+       l.velocity_gain = v * o.velocity_gain;
+       l.believed.velocity_gain = v * o.believed.velocity_gain;
+     }},
+    {"gain_error", "servo gain, times what the controller believes", 0.01, 100.0,
      [](Loop& l, const Loop& o, double v) { l.velocity_gain = v * o.velocity_gain; }},
     {"delay", "further delay [ticks]", 0.0, 50.0,
      [](Loop& l, const Loop& o, double v) { l.delay = o.delay + static_cast<int>(v); }},

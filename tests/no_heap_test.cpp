@@ -22,11 +22,15 @@ TEST(MallocGuard, CountsAnAllocation) {  // the test that the others can fail
   EXPECT_GE(guard.count(), 1);
 }
 
+constexpr const char* kCompensated =
+    "controller.compensation={feed_forward: true, observer: true, inertia: true, "
+    "mass_update_ticks: 3, ramp_s: 0.5, reading_jitter_s: 0.001}";
+
 class NoHeap : public testing::TestWithParam<const char*> {};
 
 TEST_P(NoHeap, FromArmingToParking) {
   for (const char* base :
-       {"seed=1",
+       {"seed=1", kCompensated,
         "base={mass_diagonal: [500,500,500,250,250,250], damping_diagonal: "
         "[500,400,300,200,100,90], stiffness_diagonal: [1500,2500,4000,1500,1000,2000]}"}) {
     const Experiment e = experiment(GetParam(), {base});

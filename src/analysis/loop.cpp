@@ -114,40 +114,87 @@ Channel channelOf(const Loop& loop) {
   return {all.topLeftCorner(kSize, kSize), all.block(0, kCommand, kSize, 1)};
 }
 
-/// The whole loop over a period, of {eta, eta', six channels, six late wrenches a tick of delay}.
-MatrixXd systemOf(const Loop& loop) {
-  const Channel channel = channelOf(loop);
-  const Index n = channel.step.rows(), k = loop.base.stiffness.size(), d = loop.delay;
-  const MatrixXd& Phi = loop.base.Phi;
+/// The controller's servo model of one direction over a period: z <- step z + from_command u. z =
+/// {length, speed, v_end, sensor (2)}; a reading replaces the length at every tick.
+Channel observerOf(const Loop& loop) {
+  constexpr Index kLength = 0, kSpeed = 1, kHeld = 2, kSensor = 3, kSize = 5, kCommand = kSize;
+  const Loop::Believed& own = loop.believed;
+  const double w = loop.sensor_cutoff;
+  const double update = static_cast<double>(plant::kUpdatePeriod) * kSecondPerNanosecond;
+  const double age = 0.5 * static_cast<double>(plant::kTransducerPeriod) * kSecondPerNanosecond;
+  const int updates = std::max(1, static_cast<int>(std::lround(loop.period / update)));
+  const double h = loop.period / updates;
 
-  MatrixXd hold = MatrixXd::Zero(2 * k, 2 * k), Gamma = MatrixXd::Zero(2 * k, k);
-  if (loop.base.damping.isDiagonal(0.0)) {
+  MatrixXd generator = MatrixXd::Zero(kSize + 1, kSize + 1);
+  generator(kLength, kSpeed) = 1.0;
+  generator(kSpeed, kSpeed) = -1.0 / own.tau;
+  generator(kSpeed, kHeld) = 1.0 / own.tau;
+  generator(kSensor, kSensor + 1) = 1.0;
+  generator(kSensor + 1, kSensor) = -w * w;
+  generator(kSensor + 1, kSensor + 1) = -M_SQRT2 * w;
+  generator.row(kSensor + 1) += w * w * generator.row(kSpeed);
+  MatrixXd next = MatrixXd::Identity(kSize + 1, kSize + 1);
+  next.row(kHeld).setZero();
+  next(kHeld, kLength) = -own.velocity_gain;
+  next(kHeld, kSpeed) = own.velocity_gain * (age - own.derivative);
+  next(kHeld, kCommand) = own.velocity_gain;
+
+  const MatrixXd half = (generator * 0.5 * h).exp(), whole = half * half;
+  MatrixXd all = half;
+  for (int k = 0; k < updates; ++k) all = (k + 1 < updates ? whole : half) * next * all;
+  return {all.topLeftCorner(kSize, kSize), all.block(0, kCommand, kSize, 1)};
+}
+
+/// The base over `dt`, the modal force held: {eta, eta'} <- Phi {eta, eta'} + Gamma Phi^T F.
+struct BaseHold {
+  MatrixXd Phi, Gamma;
+};
+
+BaseHold holdOf(const ModalModel& base, double dt) {
+  const Index k = base.stiffness.size();
+  BaseHold out{MatrixXd::Zero(2 * k, 2 * k), MatrixXd::Zero(2 * k, k)};
+  if (base.damping.isDiagonal(0.0)) {
     for (Index i = 0; i < k; ++i) {
-      const SecondOrderHold one =
-          discretise(loop.base.stiffness(i), loop.base.damping(i, i), loop.period);
-      hold(i, i) = one.Phi(0, 0);
-      hold(i, k + i) = one.Phi(0, 1);
-      hold(k + i, i) = one.Phi(1, 0);
-      hold(k + i, k + i) = one.Phi(1, 1);
-      Gamma(i, i) = one.Gamma(0);
-      Gamma(k + i, i) = one.Gamma(1);
+      const SecondOrderHold one = discretise(base.stiffness(i), base.damping(i, i), dt);
+      out.Phi(i, i) = one.Phi(0, 0);
+      out.Phi(i, k + i) = one.Phi(0, 1);
+      out.Phi(k + i, i) = one.Phi(1, 0);
+      out.Phi(k + i, k + i) = one.Phi(1, 1);
+      out.Gamma(i, i) = one.Gamma(0);
+      out.Gamma(k + i, i) = one.Gamma(1);
     }
-  } else {
-    MatrixXd M = MatrixXd::Zero(3 * k, 3 * k);
-    M.block(0, k, k, k).setIdentity();
-    M.block(k, 0, k, k) = -MatrixXd(loop.base.stiffness.asDiagonal());
-    M.block(k, k, k, k) = -loop.base.damping;
-    M.block(k, 2 * k, k, k).setIdentity();
-    const MatrixXd E = (M * loop.period).exp();
-    hold = E.topLeftCorner(2 * k, 2 * k);
-    Gamma = E.topRightCorner(2 * k, k);
+    return out;
   }
+  MatrixXd M = MatrixXd::Zero(3 * k, 3 * k);
+  M.block(0, k, k, k).setIdentity();
+  M.block(k, 0, k, k) = -MatrixXd(base.stiffness.asDiagonal());
+  M.block(k, k, k, k) = -base.damping;
+  M.block(k, 2 * k, k, k).setIdentity();
+  const MatrixXd E = (M * dt).exp();
+  return {E.topLeftCorner(2 * k, 2 * k), E.topRightCorner(2 * k, k)};
+}
 
-  const Index channels = 2 * k, late = channels + 6 * n, size = late + 6 * d;
+/// The whole loop over a period, of {eta, eta', six channels, six servo models where the inertia is
+/// taken out, six late wrenches a tick of delay}.
+MatrixXd systemOf(const Loop& loop) {
+  const Loop::Believed& own = loop.believed;
+  const Channel channel = channelOf(loop);
+  const Channel model = own.inertia ? observerOf(loop) : Channel{};
+  const Index n = channel.step.rows(), m = model.step.rows(), k = loop.base.stiffness.size(),
+              d = loop.delay;
+  const MatrixXd& Phi = loop.base.Phi;
+  const double T = loop.period;
+  const Index channels = 2 * k, models = channels + 6 * n, late = models + 6 * m,
+              size = late + 6 * d;
   MatrixXd S = MatrixXd::Zero(size, size);
-  const MatrixXd felt = -Gamma * Phi.transpose() * spatialMass(loop.robot_P);  // of accelerations
-  MatrixXd sampled = MatrixXd::Zero(6, size);
-  for (Index i = 0; i < 6; ++i) sampled(i, channels + i * n + Mechanics::kSensor) = 1.0;
+
+  // What the controller is given: of the accelerations, and of its own model of them.
+  constexpr Index kModelSensor = 3;
+  MatrixXd sampled = MatrixXd::Zero(6, size), modelled = MatrixXd::Zero(6, size);
+  for (Index i = 0; i < 6; ++i) {
+    sampled(i, channels + i * n + Mechanics::kSensor) = 1.0;
+    if (own.inertia) modelled(i, models + i * m + kModelSensor) = 1.0;
+  }
   MatrixXd used = sampled;
   if (d > 0) {
     used.setZero();
@@ -155,13 +202,49 @@ MatrixXd systemOf(const Loop& loop) {
     S.middleRows(late, 6) = sampled;
     for (Index i = 1; i < d; ++i) S.block(late + 6 * i, late + 6 * (i - 1), 6, 6).setIdentity();
   }
-  S.topRows(2 * k) = felt * used;
-  S.topLeftCorner(2 * k, 2 * k) += hold;
-  const MatrixXd command = Phi * S.topRows(k);  // Phi eta of the period to come
+  MatrixXd F = -spatialMass(loop.robot_P) * used;
+
+  // Admittance model.
+  const BaseHold hold = holdOf(loop.base, T);
+  MatrixXd before = MatrixXd::Zero(2 * k, size);
+  before.leftCols(2 * k).setIdentity();
+  if (own.inertia) {
+    const Mat6 M_1 = spatialMass(own.robot_P);
+    F += M_1 * modelled;
+    const MatrixXd rate = Phi * hold.Gamma.bottomRows(k) * Phi.transpose();
+    const MatrixXd change =
+        Phi * ((hold.Phi * before).bottomRows(k) - before.bottomRows(k)) + rate * F;
+    F -= M_1 * (T * Mat6::Identity() + rate * M_1).partialPivLu().solve(change);
+  }
+  const MatrixXd u = Phi.transpose() * F;
+  S.topRows(2 * k) = hold.Phi * before + hold.Gamma * u;
+
+  // The command, from where the model is at its own time or, ahead, at the legs'.
+  MatrixXd told = S.topRows(2 * k);
+  if (own.inertia) {
+    const BaseHold ahead = holdOf(loop.base, M_SQRT2 / loop.sensor_cutoff + 0.5 * T);
+    told = ahead.Phi * S.topRows(2 * k) + ahead.Gamma * u;
+  }
+  MatrixXd command = Phi * told.topRows(k);
+  if (own.feed_forward) {
+    const MatrixXd x_dot = Phi * told.bottomRows(k);
+    const MatrixXd x_ddot = Phi * (u - loop.base.stiffness.asDiagonal() * told.topRows(k) -
+                                   loop.base.damping * told.bottomRows(k));
+    const double update = static_cast<double>(plant::kUpdatePeriod) * kSecondPerNanosecond;
+    const double age = 0.5 * static_cast<double>(plant::kTransducerPeriod) * kSecondPerNanosecond;
+    const double D = own.servo_delay + update - 0.5 * T, A = D - age - 0.5 * update;
+    command += (A + own.derivative + 1.0 / own.velocity_gain) * x_dot +
+               (0.5 * A * A + own.derivative * D + (D + own.tau) / own.velocity_gain) * x_ddot;
+  }
   for (Index i = 0; i < 6; ++i) {
     const Index at = channels + i * n;
     S.middleRows(at, n) = channel.from_command * command.row(i);
     S.block(at, at, n, n) += channel.step;
+    if (!own.inertia) continue;
+    const Index own_at = models + i * m;
+    S.middleRows(own_at, m) = model.from_command * command.row(i);
+    S.block(own_at, own_at + 1, m, m - 1) += model.step.rightCols(m - 1);
+    S.col(at + Mechanics::kLength).segment(own_at, m) += model.step.col(0);  // as read
   }
   return S;
 }
@@ -194,6 +277,15 @@ Loop loopOf(const ControllerConfig& controller, const plant::PlantConfig& p, con
   loop.tau = p.actuator.tau;
   loop.filter_cutoff = p.filters == plant::LegFilters::kOutputs ? p.filter_cutoff : 0.0;
   loop.sensor_cutoff = p.sensor.cutoff;
+
+  const Compensation& c = controller.compensation;
+  const ServoModel& servo = controller.servo;
+  const double up = servo.extend.mean(), down = servo.retract.mean();
+  Loop::Believed& own = loop.believed;
+  own = {c.feed_forward,   c.inertia,          loop.robot_P,    2.0 * up * down / (up + down),
+         servo.tau.mean(), servo.delay.mean(), servo.derivative};
+  if (direction == Direction::kExtending) own.velocity_gain = up;
+  if (direction == Direction::kRetracting) own.velocity_gain = down;
   return loop;
 }
 

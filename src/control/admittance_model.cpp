@@ -24,6 +24,11 @@ AdmittanceModel::AdmittanceModel(const ModalModel& model, double period, double 
   if (coupled_) damping_ = model.damping;
   step_ = hold(model, period);
   ahead_hold_ = hold(model, ahead);
+  back_ = hold(model, 0.0);
+  constexpr double kMostGrowth = 5.0;  // [-] exponent of a damped mode's way back
+  if (coupled_ && model.damping.norm() * ahead < kMostGrowth) back_ = hold(model, -ahead);
+  for (Eigen::Index i = 0; !coupled_ && i < k; ++i)
+    if (c_(i) * ahead < kMostGrowth) back_.modes.col(i) = hold(model, -ahead).modes.col(i);
   const Eigen::MatrixXd Gamma_2 = coupled_
                                       ? Eigen::MatrixXd(step_.Gamma.bottomRows(k))
                                       : Eigen::MatrixXd(step_.modes.row(5).matrix().asDiagonal());
@@ -57,11 +62,17 @@ AdmittanceModel::Hold AdmittanceModel::hold(const ModalModel& model, double dt) 
   return out;
 }
 
-void AdmittanceModel::reset(const Vec6& x) noexcept {
+void AdmittanceModel::reset(const Vec6& x, const Mat6& M_1) noexcept {
   now_.eta.noalias() = Phi_pinv_ * x;
   now_.eta_dot.setZero();
   offset_ = x;
   offset_.noalias() -= Phi_ * now_.eta;
+  // The reaction of M_1 when let go: a = Phi (Phi^T (-M_1 a) - K eta).
+  const Mat6 left = Mat6::Identity() + Phi_ * Phi_.transpose() * M_1;
+  const Vec6 pull = Phi_ * k_.cwiseProduct(now_.eta);
+  const Vec6 a = -left.partialPivLu().solve(pull);
+  const Vector<kMaxModes> u = -(Phi_.transpose() * (M_1 * a));
+  now_ = advance(back_, now_, u);
   motion_ = {};
   motion_.x = x;
 }

@@ -394,7 +394,7 @@ void TestPlatform::begin(const Segment& segment) noexcept {
     case SegmentKind::kCalibration: calibration_.begin(); break;
     case SegmentKind::kMove: beginMove(segment.target.stacked(), segment.duration); break;
     case SegmentKind::kAdmittance:
-      admittance_.reset(segment_start_);
+      admittance_.reset(segment_start_, M_1_);
       oscillation_.reset();
       break;
     case SegmentKind::kTrajectory:
@@ -636,7 +636,8 @@ TestPlatform::Step TestPlatform::check(const TickInput& in,
 /// Where the legs should be at this tick: the last command's, or, when the servos' lag is taken
 /// out, that command brought to now.
 Vec6 TestPlatform::expectedLengths() const noexcept {
-  if (!config_.compensation.feed_forward || state_.phase == Phase::kStopped) return state_.legs.L;
+  if (state_.phase == Phase::kStopped) return state_.reference;
+  if (!config_.compensation.feed_forward) return state_.legs.L;
   const double since = commandsNextState() ? 0.0 : period_;
   return state_.legs.L + state_.compensated * since * state_.legs.L_dot;
 }
@@ -675,8 +676,6 @@ void TestPlatform::freeze() noexcept {
   oscillation_.reset();
   state_.phase = Phase::kStopped;
   state_.motion = atRest(state_.motion.x);
-  if (config_.compensation.any() && state_.command.engaged)
-    state_.legs.L = state_.reference;  // where the legs, on their way, will end
   state_.legs.L_dot.setZero();
   state_.legs.L_ddot.setZero();
 }

@@ -7,6 +7,9 @@
 //    ^                                                                            |
 //    +--- admittance model <--- delay, in ticks <--- sample <--- sensor filter <--+
 //
+// What the controller adds beyond the report (control/servo.hpp) is in it: the servo model and the
+// robot as it believes them, which need not be what they are.
+//
 // Linear about home, one controller period a step: all modes, all six directions coupled through
 // the robot's inertia at its pose, the LegSlaves' readings, average, update and derivative gain,
 // the actuators K/(s(tau s + 1)), Filter 3 (the one on accelerations), the sensor's filter. Lifted
@@ -33,6 +36,15 @@ struct Loop {
   double filter_cutoff = 0.0;    // [rad/s] of Filter 3; 0: none
   double sensor_cutoff = 0.0;    // [rad/s]
   int delay = 0;                 // [ticks] that a sample is older than it need be
+  /// Of the compensation, when it is on.
+  struct Believed {
+    bool feed_forward = false, inertia = false;
+    RigidBody robot_P;
+    double velocity_gain = 0.0;  // [1/s]
+    double tau = 0.0;            // [s]
+    double servo_delay = 0.0;    // [s] from a tick to the LegSlave
+    double derivative = 0.0;     // [s]
+  } believed;
 };
 
 /// The gain of a leg depends on which way it moves. A leg that swings has the harmonic mean, as
@@ -59,8 +71,8 @@ double radius(const Loop& loop);
 /// may turn drift (below 0.01 Hz) into a growth that takes minutes: that is let pass, up to 0.02/s.
 bool decays(const Loop& loop);
 
-/// Factor on the robot's inertia that the loop bears, and ticks of further delay; from a stable
-/// loop.
+/// Factor on the robot's inertia that the loop bears, the controller's belief unchanged, and ticks
+/// of further delay; from a stable loop.
 struct Margins {
   double gain = 0.0;  // [-] kMostGain: at least
   int delay = 0;      // [ticks] kMostDelay: at least

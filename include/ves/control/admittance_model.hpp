@@ -29,8 +29,10 @@ class AdmittanceModel {
   /// `ahead` [s]: motion() is so much later than the step's end, the wrench held.
   AdmittanceModel(const ModalModel& model, double period, double ahead = 0.0);
 
-  /// At rest at x. What the modes cannot express of x stays as a constant offset.
-  void reset(const Vec6& x) noexcept;
+  /// At rest at x. What the modes cannot express of x stays as a constant offset. With `ahead` it is
+  /// motion() that will have started from rest there: the modes start so much earlier, on the motion
+  /// with M_1 that leads to x; heavily damped ones excepted.
+  void reset(const Vec6& x, const Mat6& M_1 = Mat6::Zero()) noexcept;
 
   /// (C.6): the state one period after W began to act.
   void step(const Wrench& F_Po_I) noexcept { step(F_Po_I, Mat6::Zero(), 0.0); }
@@ -86,7 +88,7 @@ class AdmittanceModel {
   double ahead_ = 0.0;   // [s]
   bool coupled_ = false;
   Square damping_;  // when coupled
-  Hold step_, ahead_hold_;
+  Hold step_, ahead_hold_, back_;
   Mat6 rate_per_wrench_;  // Phi Gamma_2 Phi^T
   Modes now_, before_;    // before the last step
   PathPoint<6> motion_before_;

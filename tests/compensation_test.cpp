@@ -1,0 +1,448 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Beyond the report: the servos' lag and the robot's inertia taken out of the emulation.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <Eigen/LU>
+#include <filesystem>
+#include <random>
+#include <unsupported/Eigen/MatrixFunctions>
+
+#include "support/poses.hpp"
+#include "support/robots.hpp"
+#include "ves/analysis/gate.hpp"
+#include "ves/report/comparison.hpp"
+#include "ves/run/run.hpp"
+
+namespace ves {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+const std::vector<std::string> kPublished;
+const std::vector<std::string> kAll = {"controller.compensation.feed_forward=true",
+                                       "controller.compensation.observer=true",
+                                       "controller.compensation.inertia=true"};
+
+Experiment experiment(const std::string& name, std::vector<std::string> set,
+                      const std::vector<std::string>& more = {}) {
+  set.insert(set.end(), more.begin(), more.end());
+  return loadExperiment(test::configDir() + "/scenarios/" + name + ".yaml", set);
+}
+
+// The base with a body on it
+
+ModalModel base(int k) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> u(-1.0, 1.0);
+  ModalModel m;
+  m.Phi = MatrixXd::NullaryExpr(6, k, [&] { return 0.05 * u(random); });
+  m.stiffness = VectorXd::LinSpaced(k, 10.0, 900.0);
+  m.damping = (0.04 * m.stiffness.cwiseSqrt()).asDiagonal();
+  return m;
+}
+
+Mat6 body() {
+  RigidBody b;
+  b.mass = 90.0;
+  b.p_BoBcm_B = {0.1, -0.05, 0.7};
+  b.I_Bcm_B = Vec3(9.0, 8.0, 4.0).asDiagonal();
+  return spatialMass(b);
+}
+
+/// [eta, eta'] after `time` under F, by the matrix exponential of (I + Phi^T M Phi) eta'' + ..
+VectorXd exact(const ModalModel& m, const Mat6& M, const VectorXd& state, const Vec6& F,
+               double time) {
+  const Eigen::Index k = m.stiffness.size();
+  const MatrixXd A_inverse = (MatrixXd::Identity(k, k) + m.Phi.transpose() * M * m.Phi).inverse();
+  MatrixXd S = MatrixXd::Zero(2 * k + 1, 2 * k + 1);
+  S.block(0, k, k, k).setIdentity();
+  S.block(k, 0, k, k) = -A_inverse * m.stiffness.asDiagonal();
+  S.block(k, k, k, k) = -A_inverse * m.damping;
+  S.block(k, 2 * k, k, 1) = A_inverse * m.Phi.transpose() * F;
+  VectorXd z(2 * k + 1);
+  z << state, 1.0;
+  return ((S * time).exp() * z).head(2 * k);
+}
+
+/// Largest error of the commanded motion over two seconds of a constant wrench.
+double errorWithBody(double period) {
+  const ModalModel m = base(6);
+  const Vec6 F = Vec6::LinSpaced(-20.0, 30.0);
+  AdmittanceModel model(m, period);
+  model.reset(Vec6::Zero());
+  double most = 0.0;
+  for (int n = 1; n * period < 2.0; ++n) {
+    model.step(Wrench::from(F), body(), 0.0);
+    const VectorXd z = exact(m, body(), VectorXd::Zero(12), F, n * period);
+    most = std::max(most, (model.motion().x - m.Phi * z.head(6)).norm());
+  }
+  return most;
+}
+
+TEST(BodyOnTheBase, MovesAsTheAugmentedModalMassSays) {  // (3.11), second order in the period
+  const ModalModel m = base(6);
+  const double most = errorWithBody(0.01);
+  const Vec6 still = m.Phi * m.stiffness.cwiseInverse().asDiagonal() * m.Phi.transpose() *
+                     Vec6::LinSpaced(-20.0, 30.0);
+  EXPECT_LT(most, 0.01 * still.norm());
+  EXPECT_NEAR(most / errorWithBody(0.005), 4.0, 0.3);
+}
+
+TEST(BodyOnTheBase, LosesNoEnergyThatTheBaseDoesNot) {  // undamped: for minutes
+  ModalModel m = base(6);
+  m.damping.setZero();
+  AdmittanceModel model(m, 0.01);
+  const Mat6 M = body();
+  const Vec6 x0 = m.Phi * VectorXd::LinSpaced(6, 0.1, -0.2);
+  model.reset(x0);
+  // Potential and kinetic, the body's included, at the ends of steps.
+  const auto energy = [&] {
+    const Vec6& v = model.motion().x_dot;
+    return model.energy() + 0.5 * v.dot(M * v);
+  };
+  const double first = energy();
+  double low = first, high = first;
+  for (int n = 0; n < 20'000; ++n) {
+    model.step({}, M, 0.0);
+    if (n < 10'000) continue;
+    low = std::min(low, energy());
+    high = std::max(high, energy());
+  }
+  EXPECT_GT(low, 0.99 * first);
+  EXPECT_LT(high, 1.01 * first);
+}
+
+TEST(Ahead, MotionIsThatMuchLaterUnderTheSameWrench) {
+  for (const bool coupled : {false, true}) {
+    ModalModel m = base(6);
+    if (coupled) m.damping += 0.3 * MatrixXd::Ones(6, 6);
+    constexpr double kAhead = 0.016;
+    AdmittanceModel model(m, 0.01, kAhead);
+    model.reset(Vec6::Zero());
+    VectorXd z = VectorXd::Zero(12);
+    std::mt19937 random(5);
+    std::uniform_real_distribution<double> u(-50.0, 50.0);
+    for (int n = 0; n < 200; ++n) {
+      const Vec6 F = Vec6::NullaryExpr([&] { return u(random); });
+      model.step(Wrench::from(F), Mat6::Zero(), 1.0);
+      z = exact(m, Mat6::Zero(), z, F, 0.01);
+      const VectorXd later = exact(m, Mat6::Zero(), z, F, kAhead);
+      ASSERT_LT((model.motion().x - m.Phi * later.head(6)).norm(), 1e-12);
+      ASSERT_LT((model.motion().x_dot - m.Phi * later.tail(6)).norm(), 1e-11);
+    }
+  }
+}
+
+// The servo
+
+/// One leg of the machine: LegSlave, valve, cylinder, counts, as the plant runs them.
+struct Leg {
+  explicit Leg(const plant::PlantConfig& p, double L)
+      : config(p), actuator(p.actuator, L), slave(p.leg_slave, p.transducer.count(L)) {}
+
+  void run(std::int32_t reference, double time) {
+    const double to = now + time;
+    while (next_reading <= to) {
+      pass(next_reading - now);
+      slave.read(config.transducer.count(actuator.length()), reference);
+      next_reading += 341e-6;
+    }
+    pass(to - now);
+  }
+  void pass(double dt) {
+    actuator.advance(slave.current(), dt, std::exp(-dt / config.actuator.tau));
+    now += dt;
+  }
+
+  plant::PlantConfig config;
+  plant::Actuator actuator;
+  plant::LegSlave slave;
+  double now = 0.0, next_reading = 150e-6;
+};
+
+TEST(FeedForward, LegFollowsASineWithoutItsLag) {  // both directions; published: 18 and 27 percent
+  const Experiment e = experiment("z_sine", kAll);
+  for (const double hertz : {0.5, 2.0}) {
+    const double w = 2.0 * M_PI * hertz, amplitude = 0.4 / w, T = 0.01, middle = 1.5;
+    Leg leg(e.plant, middle);
+    const Vec6 one = Vec6::Ones();
+    double most = 0.0;
+    for (int n = 0; n * T < 3.0; ++n) {
+      const double t = n * T, c = std::cos(w * t), s = std::sin(w * t);
+      // From rest: the first half second is the start.
+      const LegMotion legs{(middle + amplitude * s) * one, amplitude * w * c * one,
+                           -amplitude * w * w * s * one};
+      if (t > 0.5) most = std::max(most, std::abs(leg.actuator.length() - legs.L(0)));
+      const Vec6 r = feedForward(e.controller.servo, legs, 0.0, T, 1.0);
+      leg.run(legCounts(e.controller.legs, r)[0], T);
+    }
+    EXPECT_LT(most, (hertz < 1.0 ? 0.01 : 0.02) * amplitude) << hertz;
+  }
+}
+
+TEST(FeedForward, NeverAsksForMoreThanTheRail) {
+  const ServoModel servo = experiment("z_sine", kAll).controller.servo;
+  for (const double v : {-50.0, -1.0, 0.3, 2.0, 80.0}) {
+    LegMotion legs;
+    legs.L.setConstant(1.5);
+    legs.L_dot.setConstant(v);
+    const Vec6 r = feedForward(servo, legs, 0.0, 0.01, 1.0);
+    const double A = 0.005 + 0.5 * servo.update - servo.reading_age;
+    const double E = std::abs(r(0) - 1.5 - A * v);
+    EXPECT_LE(E, servo.rail * (1.0 + 1e-12)) << v;
+  }
+}
+
+TEST(FeedForward, ShareZeroIsTheReportsReference) {
+  const ServoModel servo = experiment("z_sine", kAll).controller.servo;
+  const LegMotion legs{Vec6::Constant(1.5), Vec6::Constant(0.3), Vec6::Constant(-2.0)};
+  EXPECT_EQ(feedForward(servo, legs, 0.01, 0.01, 0.0), legs.L);
+}
+
+TEST(ServoObserver, KnowsSpeedAndLengthBelowACount) {
+  const Experiment e = experiment("z_sine", kAll);
+  const double T = 0.01, scale = e.plant.transducer.scale;
+  Leg leg(e.plant, 1.5);
+  ServoObserver observer(e.controller.servo, T);
+  observer.reset(Vec6::Constant(1.5));
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> u(-1.0, 1.0);
+  double length = 0.0, speed = 0.0, fastest = 0.0, rate = 0.0;
+  int n = 0;
+  for (int k = 0; k < 2000; ++k) {
+    rate = 0.98 * rate + 0.002 * u(random);  // [m/s]
+    const double r = 1.5 + 0.02 * std::sin(0.004 * k) + rate;
+    const LegCounts counts = legCounts(e.controller.legs, Vec6::Constant(r));
+    leg.run(counts[0], T);
+    observer.advance(legLengths(e.controller.legs, counts));
+    LegCounts read{};
+    read.fill(e.plant.transducer.count(leg.actuator.length()));
+    observer.correct(legLengths(e.controller.legs, read));
+    ++n;
+    length += std::pow(observer.length()(0) - leg.actuator.length(), 2);
+    speed += std::pow(observer.velocity()(0) - leg.actuator.velocity(), 2);
+    fastest = std::max(fastest, std::abs(leg.actuator.velocity()));
+  }
+  EXPECT_LT(std::sqrt(length / n), 0.15 * scale);  // a count alone says 0.29
+  EXPECT_LT(std::sqrt(speed / n), 0.02 * fastest);
+}
+
+TEST(ServoObserver, ReadingBoundsItWhateverTheModel) {
+  Experiment e = experiment("z_sine", kAll);
+  e.controller.servo.extend *= 1.5;
+  e.controller.servo.jitter = 0.0;
+  ServoObserver observer(e.controller.servo, 0.01);
+  observer.reset(Vec6::Constant(1.5));
+  for (int k = 0; k < 50; ++k) {
+    observer.advance(Vec6::Constant(1.5 + 0.001 * k));
+    const Vec6 read = Vec6::Constant(1.5 + 0.0003 * k);
+    observer.correct(read);
+    EXPECT_LE((observer.length() - read).cwiseAbs().maxCoeff(),
+              0.5 * e.plant.transducer.scale * (1 + 1e-9));
+  }
+}
+
+// The whole
+
+class Emulation : public testing::Test {
+ protected:
+  void TearDown() override { std::filesystem::remove(log_); }
+
+  Series run(const Experiment& e) {
+    {
+      LogWriter writer(log_.string());
+      result_ = runLockstep(e, &writer, nullptr);
+    }
+    return readSeries(log_.string());
+  }
+  std::filesystem::path log_ =
+      std::filesystem::temp_directory_path() / ("ves_compensation_" + std::to_string(getpid()));
+  RunResult result_;
+};
+
+/// The platform's largest error in a segment after its first half second.
+Vec6 settledError(const Series& series, int segment, const std::function<Vec6(double)>& should) {
+  Vec6 most = Vec6::Zero();
+  double start = -1.0;
+  for (const Row& row : series.rows) {
+    if (row.state.phase != static_cast<int>(Phase::kRunning) || row.state.segment != segment)
+      continue;
+    if (start < 0.0) start = row.t;
+    const double t = row.t - start;
+    if (t > 0.5) most = most.cwiseMax((Vec6::Map(row.truth.x) - should(t)).cwiseAbs());
+  }
+  return most;
+}
+
+TEST_F(Emulation, SinesOf421AreFollowedWithinAPercent) {  // noise and counts on
+  for (const auto& [name, i] : {std::pair{"z_sine", 2}, std::pair{"alpha_sine", 3}}) {
+    const Experiment e = experiment(name, kAll);
+    const Axis axis = e.controller.program.segments[1].trajectory[static_cast<std::size_t>(i)];
+    const Series series = run(e);
+    ASSERT_TRUE(result_.good());
+    const Vec6 error = settledError(series, 1, [&, i = i](double t) -> Vec6 {
+      return axis.amplitude * std::sin(2.0 * M_PI * axis.frequency * (t + 0.01)) * Vec6::Unit(i);
+    });
+    EXPECT_LT(error(i), 0.01 * axis.amplitude) << name;
+  }
+}
+
+TEST_F(Emulation, FreeDecayOfTable41IsTheClosedFormsOwn) {
+  const Series series = run(experiment("free_decay", kAll));
+  ASSERT_TRUE(result_.good());
+  const double m[] = {500, 500, 500, 250, 250, 250}, k[] = {1500, 2500, 4000, 1500, 1000, 2000};
+  Vec6 offset;
+  offset << 0.10, -0.08, 0.06, 8 * kDegree, -6 * kDegree, 10 * kDegree;
+  const Vec6 error = settledError(series, 3, [&](double t) {
+    Vec6 x;
+    for (int i = 0; i < 6; ++i) {
+      const double wd = std::sqrt(k[i] / m[i] - 0.25);  // c/m is 1 for all
+      x(i) = offset(i) * std::exp(-0.5 * t) * (std::cos(wd * t) + 0.5 / wd * std::sin(wd * t));
+    }
+    return x;
+  });
+  for (int i = 0; i < 6; ++i) EXPECT_LT(error(i), 0.02 * std::abs(offset(i))) << i;
+}
+
+TEST_F(Emulation, DossOnTheShuttlesArmMovesAsTheMovingBaseDoes) {
+  // Without noise: the counts of legs and A/D converter are in it, and are what is left.
+  for (const char* configuration : {"unberth", "low_hover", "deploy", "capture"})
+    for (const bool six : {false, true}) {
+      std::vector<std::string> more = {"sensor.noise=false"};
+      if (six) more.push_back("base.keep_modes=6");
+      Experiment e = experiment(std::string("srms_") + configuration + "_doss", kAll, more);
+      EXPECT_EQ(admit(e.controller, e.plant), "") << e.name;
+      const Series series = run(e);
+      ASSERT_TRUE(result_.good()) << e.name;
+      std::int64_t duration = 0;
+      const Interaction interaction = interactionOf(e, duration);
+      InteractionOptions options;
+      options.model = InteractionModel::kWhole;
+      options.duration = duration;
+      const Motion truth = motion(simulate(interaction, options));
+      EXPECT_LT(distance(actual(series), truth).rms_position,
+                (six ? 0.05 : 0.02) * travel(truth).peak_position)
+          << e.name << " " << six;
+    }
+}
+
+/// A base in space whose every frequency is `hertz` and which weighs a `ratio`-th of the robot.
+std::vector<std::string> lightBase(double ratio, double hertz, double zeta) {
+  std::string m, c, k;
+  for (int i = 0; i < 6; ++i) {
+    const double mass = (i < 3 ? 73.45 : 40.0) / ratio, w = 2.0 * M_PI * hertz;
+    m += (i ? "," : "") + std::to_string(mass);
+    c += (i ? "," : "") + std::to_string(2.0 * zeta * w * mass);
+    k += (i ? "," : "") + std::to_string(w * w * mass);
+  }
+  return {"gravity_m_per_s2=0", "sensor.noise=false",
+          "base={mass_diagonal: [" + m + "], damping_diagonal: [" + c + "], stiffness_diagonal: [" +
+              k + "]}",
+          "program=[{move: {}}, {calibration: {}}, {move: {to: {x_m: 0.04, z_m: 0.03}}}, "
+          "{admittance: {duration_s: 12}}]"};
+}
+
+TEST_F(Emulation, MassRatioOfFiveDecaysAsItShould) {  // Appendix E ends at one
+  const std::vector<std::string> set = lightBase(5.0, 0.5, 0.02);
+  Experiment published = experiment("puma_on_table_4_1", kPublished, set);
+  EXPECT_NE(admit(published.controller, published.plant), "");
+  EXPECT_FALSE(runLockstep(published, nullptr, nullptr).good());
+
+  Experiment e = experiment("puma_on_table_4_1", kAll, set);
+  EXPECT_EQ(admit(e.controller, e.plant), "");
+  const Series series = run(e);
+  ASSERT_TRUE(result_.good());
+  std::int64_t duration = 0;
+  const Interaction interaction = interactionOf(e, duration);
+  InteractionOptions options;
+  options.model = InteractionModel::kWhole;
+  options.duration = duration;
+  const Vec6 x0 = (Vec6() << 0.04, 0.0, 0.03, 0.0, 0.0, 0.0).finished();
+  options.eta = interaction.base.Phi.partialPivLu().solve(x0);
+  options.eta_dot = VectorXd::Zero(6);
+  const Motion truth = motion(simulate(interaction, options));
+  EXPECT_LT(distance(actual(series), truth).rms_position, 0.02 * x0.norm());
+}
+
+TEST_F(Emulation, LoopModelKnowsTheCompensation) {
+  // Growth that the linear loop foresees, against the whole machine, where the controller believes
+  // another mass, or another servo gain, than there is.
+  int stable = 0, unstable = 0;
+  const auto compare = [&](const Experiment& e, const Loop& loop, const std::string& what) {
+    const Slowest s = slowest(loop);
+    if (s.growth > -0.01 && s.growth < 0.5) return;  // twenty seconds do not tell
+    (s.growth > 0.0 ? unstable : stable) += 1;
+    EXPECT_EQ(runLockstep(e, nullptr, nullptr).good(), s.growth < 0.0)
+        << what << ": " << s.growth << " per s at " << s.frequency << " Hz";
+  };
+  for (const char* scenario : {"srms_deploy_doss", "srms_unberth_doss"})
+    for (const double error : {0.5, 0.8, 1.2, 1.6, 2.0}) {
+      const std::string what = std::string(scenario) + " " + std::to_string(error);
+      Experiment e = experiment(scenario, kAll,
+                                {"base.keep_modes=6", "sensor.noise=false", "gravity_m_per_s2=0"});
+      const Loop right =
+          loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kSwinging);
+
+      Experiment heavier = e;
+      const auto scale = [&](RigidBody& body) {
+        body.mass *= error;
+        body.I_Bcm_B *= error;
+      };
+      Payload& payload = heavier.plant.payload;
+      scale(payload.robot.base);
+      for (Link& link : payload.robot.links) scale(link.body);
+      scale(payload.top_plate_S);
+      scale(payload.adapter_R);
+      Loop loop = right;
+      scale(loop.robot_P);
+      compare(heavier, loop, what + " times the mass");
+
+      Experiment faster = e;
+      faster.plant.actuator.gain_extend *= error;
+      faster.plant.actuator.gain_retract *= error;
+      loop = right;
+      loop.velocity_gain *= error;
+      compare(faster, loop, what + " times the gain");
+    }
+  EXPECT_GT(stable, 5);
+  EXPECT_GT(unstable, 2);
+}
+
+TEST_F(Emulation, ComesInWithoutABump) {
+  // From arming on, held still: no leg leaves its place by more than a count while the share rises.
+  const Experiment e =
+      experiment("puma_on_table_4_1", kAll, {"program=[{calibration: {}}]", "initial_pose={}"});
+  const Series series = run(e);
+  ASSERT_TRUE(result_.good());
+  bool rising = false;
+  for (const Row& row : series.rows) {
+    if (row.state.engaged == 0) continue;
+    rising = rising || (row.state.compensated > 0.1 && row.state.compensated < 0.9);
+    for (int i = 0; i < 6; ++i)
+      ASSERT_NEAR(row.truth.leg[i], series.rows.front().truth.leg[i], e.plant.transducer.scale);
+  }
+  EXPECT_TRUE(rising);
+}
+
+TEST_F(Emulation, StopEndsWhereTheLegsWereTold) {  // a freeze in the middle of a fast motion
+  const Experiment e = experiment(
+      "z_sine", kAll,
+      {"program=[{trajectory: {duration_s: 3, z: {sine: {amplitude_m: 0.2, frequency_hz: 0.5}}}, "
+       "faults: [{at_s: 2.0, duration_s: 5, fault: panic_button}]}]"});
+  const Series series = run(e);
+  EXPECT_EQ(result_.phase, Phase::kStopped);
+  const Row& last = series.rows.back();
+  EXPECT_EQ(last.state.latched, 1 << static_cast<int>(Check::kPanicButton));
+  for (int i = 0; i < 6; ++i)
+    EXPECT_NEAR(last.truth.leg[i], last.state.reference[i], 2.0 * e.plant.transducer.scale);
+}
+
+TEST(CompensationConfig, InertiaNeedsTheObserver) {
+  EXPECT_THROW(experiment("z_sine", {"controller.compensation.inertia=true"}), InputError);
+}
+
+}  // namespace
+}  // namespace ves
