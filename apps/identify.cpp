@@ -5,7 +5,9 @@
 
 #include "runner.hpp"
 #include "ves/config/masses.hpp"
+#include "ves/config/servo.hpp"
 #include "ves/identification/scenario.hpp"
+#include "ves/identification/servo_identification.hpp"
 #include "ves/report/rests.hpp"
 #include "ves/run/iterative_compensation.hpp"
 
@@ -118,6 +120,50 @@ int masses(const std::string& log, const std::string& file) {
   return app::kDone;
 }
 
+/// The servos from any log in which every leg moves both ways.
+int servo(const std::string& log, const std::string& file) {
+  const Series series = readSeries(log);
+  const ControllerConfig& c = series.experiment.controller;
+  // The longest stretch under command without a gap.
+  LegRecord longest, record;
+  std::int64_t last = -1;
+  for (const Row& row : series.rows) {
+    if (!row.state.engaged || !row.has_sample || row.state.header.sequence != last + 1) record = {};
+    last = row.state.header.sequence;
+    if (!row.state.engaged || !row.has_sample) continue;
+    LegCounts sent{}, read{};
+    std::copy_n(row.state.counts, kLegs, sent.begin());
+    std::copy_n(row.sample.legs, kLegs, read.begin());
+    record.reference.push_back(legLengths(c.legs, sent));
+    record.length.push_back(legLengths(c.legs, read));
+    if (record.length.size() > longest.length.size()) longest = record;
+  }
+  ServoEstimate found;
+  try {
+    found = identifyServo(c.servo, static_cast<double>(c.period) * kSecondPerNanosecond, longest);
+  } catch (const std::domain_error& error) {
+    throw InputError(fmt::format("{}: {}", log, error.what()));
+  }
+  fmt::print("{:>3}{:>22}{:>22}{:>20}{:>20}{:>12}\n", "leg", "extending [1/s]", "retracting [1/s]",
+             "tau [ms]", "delay [ms]", "rest [um]");
+  for (int i = 0; i < kLegs; ++i) {
+    const auto cell = [&](Vec6 ServoModel::*value, double scale) {
+      return fmt::format("{:.3f} +- {:.3f}", scale * (found.servo.*value)(i),
+                         scale * (found.deviation.*value)(i));
+    };
+    fmt::print("{:>3}{:>22}{:>22}{:>20}{:>20}{:>12.1f}\n", i + 1, cell(&ServoModel::extend, 1.0),
+               cell(&ServoModel::retract, 1.0), cell(&ServoModel::tau, 1e3),
+               cell(&ServoModel::delay, 1e3), found.residual(i) * 1e6);
+  }
+  if (file.empty()) return app::kDone;
+  const std::string yaml = write({std::time(nullptr), found.servo, found.deviation});
+  const Value written = parseDocument(yaml, file);
+  readServo(Section(written, ""));  // what would be refused is not written
+  app::writeFile(file, yaml);
+  fmt::print("{}\n", file);
+  return app::kDone;
+}
+
 int iterate(const app::Options& load, const IterativeOptions& options, const std::string& file) {
   const Experiment e = load.load();
   app::printWarnings(e);
@@ -175,6 +221,11 @@ int main(int argc, char** argv) {
       "masses", "mass parameters from a log in which platform and robot stand still in many poses");
   of_masses->add_option("log", name, "LCM event log of a run")->required();
   of_masses->add_option("--out", file, "file for --masses of run, demo and controller");
+  CLI::App* of_servo = cli.add_subcommand(
+      "servo",
+      "gains, lag and delay of every leg from a log, of servo_identification for instance");
+  of_servo->add_option("log", name, "LCM event log of a run")->required();
+  of_servo->add_option("--out", file, "file for --servo of run and controller");
   CLI::App* of_path = cli.add_subcommand(
       "iterate",
       "Kuklinski's compensation without a mass model: slow and fast passes of a scenario's robot "
@@ -206,6 +257,7 @@ int main(int argc, char** argv) {
       return iterate(load, iterative, file);
     }
     if (of_masses->parsed()) return masses(name, file);
+    if (of_servo->parsed()) return servo(name, file);
     options.tilt = tilt * kDegree;
     return plan(name, options, speed, file);
   });

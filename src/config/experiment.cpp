@@ -394,6 +394,28 @@ class ProgramReader {
   Experiment& out_;
 };
 
+/// What the machine is, beside what everybody believes: factors on the robot's masses, on its
+/// links' centres of mass, and on the servos.
+void readReality(Section s, plant::PlantConfig& p) {
+  const auto factor = [&](const char* key, double& value) {
+    if (s.has(key)) value *= s.number(key, 0.01, 100.0);
+  };
+  factor("gain_extend", p.actuator.gain_extend);
+  factor("gain_retract", p.actuator.gain_retract);
+  factor("tau", p.actuator.tau);
+  const double mass = s.has("mass") ? s.number("mass", 0.01, 100.0) : 1.0;
+  const double center = s.has("center") ? s.number("center", 0.0, 10.0) : 1.0;
+  const auto change = [&](RigidBody& body) {
+    body.mass *= mass;
+    body.I_Bcm_B *= mass;
+    body.p_BoBcm_B *= center;
+  };
+  change(p.payload.robot.base);
+  for (int i = 0; i < p.payload.robot.joints; ++i)
+    change(p.payload.robot.links[static_cast<std::size_t>(i)].body);
+  s.finish();
+}
+
 int countSubstitutes(const Value& value, bool inherited) {
   const bool substitute = value.tag.empty() ? inherited : value.tag == "substitute";
   if (value.kind == Value::Kind::kScalar) return substitute ? 1 : 0;
@@ -493,6 +515,7 @@ Experiment build(const Value& document) {
   p.climate = sensor.climate;
   p.payload = c.payload;
   p.gravity = c.gravity;
+  if (root.has("reality")) readReality(root.section("reality"), p);
   const Vec6 L = legLengths(p.geometry, p.geometry.fromHome(p.initial_pose));
   if (L.minCoeff() < p.actuator.length_min || L.maxCoeff() > p.actuator.length_max)
     root.fail(

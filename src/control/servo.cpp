@@ -22,15 +22,14 @@ Vec6 feedForward(const ServoModel& servo, const LegMotion& legs, double lead, do
   return reference;
 }
 
-ServoObserver::ServoObserver(const ServoModel& servo, double period)
+ServoObserver::ServoObserver(const ServoModel& servo, double period, double phase)
     : servo_(servo),
-      updates_(std::max(1, static_cast<int>(std::lround(period / servo.update)))),
-      update_(period / updates_),
+      period_(period),
+      to_update_(phase * servo.update),
       filter_(servo.sensor_cutoff),
-      whole_(passage(update_)),
-      half_(passage(0.5 * update_)) {}
+      whole_(passage(servo.update)) {}
 
-ServoObserver::Passage ServoObserver::passage(double dt) const {
+ServoObserver::Passage ServoObserver::passage(double dt) const noexcept {
   return {dt, (-dt / servo_.tau.array()).exp(), filter_.prepare(dt)};
 }
 
@@ -42,20 +41,31 @@ void ServoObserver::reset(const Vec6& L) noexcept {
 }
 
 void ServoObserver::advance(const Vec6& reference) noexcept {
-  // The updates fall anywhere in the period: in the middle of their own, here.
-  pass(half_);
-  for (int k = 0; k < updates_; ++k) {
-    for (int i = 0; i < kLegs; ++i) {
-      // Share of all phases of the updates for which the new reference has arrived.
-      const double arrived = std::clamp((k + 1) - servo_.delay(i) / update_, 0.0, 1.0);
-      const double r = reference_(i) + arrived * (reference(i) - reference_(i));
-      const double E = std::clamp(r - reading(i, L_(i), v_(i)) - servo_.derivative * v_(i),
-                                  -servo_.rail, servo_.rail);
-      v_end_(i) = (E > 0.0 ? servo_.extend(i) : servo_.retract(i)) * E;
-    }
-    pass(k + 1 < updates_ ? whole_ : half_);
+  double left = period_;
+  bool first = true;
+  while (to_update_ <= left) {
+    if (to_update_ > 0.0) pass(first ? passage(to_update_) : whole_);
+    first = false;
+    left -= to_update_;
+    to_update_ = servo_.update;
+    Vec6 arrived;
+    for (int i = 0; i < kLegs; ++i)
+      arrived(i) = period_ - left >= servo_.delay(i) ? reference(i) : reference_(i);
+    update(arrived);
   }
+  if (left > 0.0) pass(passage(left));
+  to_update_ -= left;
   reference_ = reference;
+}
+
+/// All LegSlaves compare.
+void ServoObserver::update(const Vec6& reference) noexcept {
+  for (int i = 0; i < kLegs; ++i) {
+    const double X = reading(i, L_(i), v_(i));
+    const double E =
+        std::clamp(reference(i) - X - servo_.derivative * v_(i), -servo_.rail, servo_.rail);
+    v_end_(i) = (E > 0.0 ? servo_.extend(i) : servo_.retract(i)) * E;
+  }
 }
 
 void ServoObserver::pass(const Passage& passage) noexcept {
@@ -82,12 +92,13 @@ double ServoObserver::reading(int leg, double L, double v) const noexcept {
 
 Vec6 ServoObserver::rounding(const Vec6& L_dot) const noexcept {
   Vec6 sum = Vec6::Zero();
-  for (int k = 0; k < updates_; ++k)
+  int updates = 0;
+  for (double t = to_update_; t < period_; t += servo_.update, ++updates)
     for (int i = 0; i < kLegs; ++i) {
-      const double v = L_dot(i), L = L_(i) + (k + 0.5) * update_ * v;
+      const double v = L_dot(i), L = L_(i) + t * v;
       sum(i) += reading(i, L, v) - (L - servo_.reading_age * v);
     }
-  return sum / updates_;
+  return sum / std::max(1, updates);
 }
 
 }  // namespace ves

@@ -3,11 +3,14 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <stdexcept>
 #include <utility>
 
+#include "ves/report/comparison.hpp"
 #include "ves/report/looks.hpp"
 
 namespace ves {
@@ -149,6 +152,43 @@ void addDrift(const Series& series, nlohmann::ordered_json& out) {
   }
 }
 
+/// The platform's motion in the first admittance segment beside that of the robot on its base in
+/// free space (SRMS-robot, chapter 3, nothing left out): what the emulation is for.
+void addEmulation(const Series& series, nlohmann::ordered_json& out) {
+  constexpr Eigen::Index kMostModes = 12;  // more would take longer than the run
+  const Experiment& e = series.experiment;
+  if (!wantsAdmittance(e.controller.program) ||
+      e.controller.admittance.stiffness.size() > kMostModes)
+    return;
+  Motion platform = actual(series);
+  if (platform.x.size() < 2) return;
+  std::int64_t duration = 0;
+  const Interaction interaction = interactionOf(e, duration);
+  InteractionOptions options;
+  options.model = InteractionModel::kWhole;
+  options.step = e.controller.period;
+  options.duration = duration;
+  // From where it was let go; what the modes do not express of that stays.
+  const Vec6 start = commanded(series).x.front();
+  options.eta = interaction.base.Phi.completeOrthogonalDecomposition().solve(start);
+  options.eta_dot = Eigen::VectorXd::Zero(options.eta.size());
+  const Vec6 rest = start - interaction.base.Phi * options.eta;
+  for (Vec6& x : platform.x) x -= rest;
+  Motion base;
+  try {
+    base = motion(simulate(interaction, options));
+  } catch (const std::domain_error&) {
+    return;  // it grows without bound
+  }
+  const Distance error = distance(platform, base), moved = travel(base);
+  out["emulation_travel_m"] = moved.peak_position;
+  out["emulation_error_rms_m"] = error.rms_position;
+  out["emulation_error_max_m"] = error.peak_position;
+  out["emulation_travel_rad"] = moved.peak_attitude;
+  out["emulation_error_rms_rad"] = error.rms_attitude;
+  out["emulation_error_max_rad"] = error.peak_attitude;
+}
+
 /// Of a real-time run: the medians and tails of its times, their histograms, and the missed ticks.
 void addTiming(const Series& series, nlohmann::ordered_json& out) {
   const timing_t* last = nullptr;
@@ -210,6 +250,7 @@ nlohmann::ordered_json summarise(const Series& series, const RunResult& result) 
   out["messages_lost"] = result.lost;
   out["real_time_factor"] = result.wall > 0.0 ? result.simulated / result.wall : 0.0;
   addTracking(series, out);
+  addEmulation(series, out);
   addWrench(series, out);
   addDrift(series, out);
   addTiming(series, out);
@@ -259,6 +300,13 @@ std::string table(const nlohmann::ordered_json& s) {
     out += fmt::format("  z error  {:.1f} mm extending, {:.1f} mm retracting\n",
                        number("z_error_max_extending_m") * 1e3,
                        number("z_error_max_retracting_m") * 1e3);
+  if (s.contains("emulation_error_rms_m"))
+    out += fmt::format(
+        "  beside the robot on its base in free space, which moves {:.3f} mm and {:.4f} deg:\n"
+        "           off by {:.3f} mm and {:.4f} deg rms, {:.3f} mm and {:.4f} deg at most\n",
+        number("emulation_travel_m") * 1e3, number("emulation_travel_rad") / kDegree,
+        number("emulation_error_rms_m") * 1e3, number("emulation_error_rms_rad") / kDegree,
+        number("emulation_error_max_m") * 1e3, number("emulation_error_max_rad") / kDegree);
   for (const char* when : {"still", "moving"}) {
     const std::string force = fmt::format("dynamic_force_max_{}_n", when);
     if (s.contains(force))

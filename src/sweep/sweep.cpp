@@ -32,6 +32,10 @@ namespace fs = std::filesystem;
 
 /// Numbers of a run's summary that make columns.
 constexpr const char* kNumbers[] = {"simulated_s",
+                                    "emulation_travel_m",
+                                    "emulation_error_rms_m",
+                                    "emulation_error_max_m",
+                                    "emulation_error_rms_rad",
                                     "x_peak_to_peak_m",
                                     "x_error_max_m",
                                     "x_error_rms_m",

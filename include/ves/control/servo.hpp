@@ -50,7 +50,9 @@ Vec6 feedForward(const ServoModel& servo, const LegMotion& legs, double lead, do
 /// edge, so what the model knows below a count stays.
 class ServoObserver {
  public:
-  ServoObserver(const ServoModel& servo, double period);
+  /// `phase` [-] of an update is to pass until the first: which one the LegSlaves have nobody
+  /// knows, and they go through all of them.
+  ServoObserver(const ServoModel& servo, double period, double phase = 0.5);
 
   /// At rest at L.
   void reset(const Vec6& L) noexcept;
@@ -79,15 +81,16 @@ class ServoObserver {
     Channels decay;   // e^{-dt/tau}
     Butterworth2<kLegs>::Step filter;
   };
-  Passage passage(double dt) const;
+  Passage passage(double dt) const noexcept;
   double reading(int leg, double L, double v) const noexcept;
   void pass(const Passage& passage) noexcept;
+  void update(const Vec6& reference) noexcept;
 
   ServoModel servo_;
-  int updates_;    // [-] of the LegSlaves in a period
-  double update_;  // [s] a whole number of them fills a period
+  double period_;
+  double to_update_;  // [s] until the next one
   Butterworth2<kLegs> filter_;
-  Passage whole_, half_;  // an update, and half of one
+  Passage whole_;  // of an update
   Vec6 L_ = Vec6::Zero(), v_ = Vec6::Zero(), v_end_ = Vec6::Zero();
   Vec6 reference_ = Vec6::Zero();  // of the period before
 };

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// The servos from a run that moves every leg both ways: what compensation believes of them.
+#pragma once
+
+#include <vector>
+
+#include "ves/control/servo.hpp"
+
+namespace ves {
+
+/// What the legs were told and what they did, a tick each, without gaps.
+struct LegRecord {
+  std::vector<Vec6> reference;  // [m] sent in this tick
+  std::vector<Vec6> length;     // [m] read in this tick, before that
+};
+
+struct ServoEstimate {
+  ServoModel servo;              // velocity gains, tau and delay found; the rest as given
+  ServoModel deviation;          // standard, of the same
+  Vec6 residual = Vec6::Zero();  // [m] rms, of lengths that the model foretells
+};
+
+/// Least squares on the lengths that the servo model of `nominal`, let run by itself, foretells:
+/// Gauss-Newton, each leg for itself, over the phases that the LegSlaves may have had, whose spread is
+/// in the deviations. Throws std::domain_error where a leg moves too little to
+/// tell.
+ServoEstimate identifyServo(const ServoModel& nominal, double period, const LegRecord& record);
+
+}  // namespace ves
