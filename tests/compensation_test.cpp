@@ -429,6 +429,61 @@ TEST_F(Emulation, ComesInWithoutABump) {
   EXPECT_TRUE(rising);
 }
 
+TEST_F(Emulation, GoesOutAndComesBackInTheMiddleOfASwing) {
+  // A decay on Table 4.1 with the PUMA: while the compensation goes out and comes in, no reference
+  // steps farther in a tick than the motion itself made it before.
+  const Experiment e = experiment(
+      "puma_on_table_4_1", kAll,
+      {"gravity_m_per_s2=0", "sensor.noise=false",
+       "program=[{move: {}}, {calibration: {}}, {move: {to: {x_m: 0.05, z_m: 0.04}}}, {admittance: "
+       "{duration_s: 8}}]"});
+  int since = 0;
+  Vec6 last = Vec6::Zero();
+  double most = 0.0, least = 1.0, jump = 0.0, plain = 0.0;
+  const RunResult result = runLockstep(e, nullptr, [&](const TickState& state) -> Order {
+    if (state.kind != SegmentKind::kAdmittance) return {};
+    ++since;
+    const double change = (state.reference - last).cwiseAbs().maxCoeff();
+    last = state.reference;
+    if (since > 2 && since < 100) plain = std::max(plain, change);
+    if (since > 100) jump = std::max(jump, change);
+    if (since > 200 && since < 300) least = std::min(least, state.compensated);
+    if (since > 400) most = state.compensated;
+    if (since == 150) return {Request::kUncompensate, {}, {}};
+    if (since == 300) return {Request::kCompensate, {}, {}};
+    return {};
+  });
+  EXPECT_TRUE(result.good());
+  EXPECT_EQ(least, 0.0);
+  EXPECT_EQ(most, 1.0);
+  EXPECT_LT(jump, plain);
+}
+
+TEST_F(Emulation, IsNotTakenOutOfALoopThatNeedsIt) {
+  Experiment e = experiment("srms_deploy_doss", kAll, {"base.keep_modes=6"});
+  EXPECT_EQ(admit(e.controller, e.plant), "");
+  EXPECT_FALSE(e.controller.admissible_uncompensated);
+  bool asked = false, refused = false;
+  const RunResult result = runLockstep(e, nullptr, [&](const TickState& state) -> Order {
+    refused = refused || (asked && state.refusal == Refusal::kUnstable);
+    if (asked || state.kind != SegmentKind::kAdmittance) return {};
+    asked = true;
+    return {Request::kUncompensate, {}, {}};
+  });
+  EXPECT_TRUE(refused);
+  EXPECT_TRUE(result.good());
+}
+
+TEST_F(Emulation, StuckValveStopsIt) {
+  const Experiment e = experiment(
+      "z_sine", kAll,
+      {"program=[{trajectory: {duration_s: 3, z: {sine: {amplitude_m: 0.2, frequency_hz: 0.5}}}, "
+       "faults: [{at_s: 1.0, duration_s: 5, fault: valve_stuck, which: 3}]}]"});
+  const RunResult result = runLockstep(e, nullptr, nullptr);
+  EXPECT_EQ(result.phase, Phase::kStopped);
+  EXPECT_EQ(result.cause, Check::kPositionError);
+}
+
 TEST_F(Emulation, StopEndsWhereTheLegsWereTold) {  // a freeze in the middle of a fast motion
   const Experiment e = experiment(
       "z_sine", kAll,

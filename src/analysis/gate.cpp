@@ -120,6 +120,12 @@ std::string explain(const LoopVerdict& v) {
 }
 
 std::string admit(ControllerConfig& controller, const plant::PlantConfig& plant) {
+  if (controller.compensation.any()) {
+    ControllerConfig published = controller;
+    published.compensation = {};
+    controller.admissible_uncompensated =
+        controller.forced || judge(published, plant, false).stable;
+  }
   if (judge(controller, plant, false).stable) return {};
   controller.admissible = controller.forced;
   return explain(judge(controller, plant));

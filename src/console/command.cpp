@@ -160,6 +160,8 @@ const std::vector<Item>& menu() {
       {Verb::kStatus, "status", "", "where everything is"},
       {Verb::kHold, "hold", "", "brake and stay"},
       {Verb::kReset, "reset", "", "out of a stop, back to disarmed"},
+      {Verb::kCompensate, "compensate", "", "lag and inertia out, as far as configured"},
+      {Verb::kUncompensate, "uncompensate", "", "as published again"},
       {Verb::kWait, "wait", "SECONDS", "nothing, for so long"},
       {Verb::kHelp, "help", "", "this list"},
       {Verb::kQuit, "quit", "", "home, let go, end"},
@@ -214,6 +216,8 @@ Command parseCommand(const std::string& line, const Experiment& experiment) {
     case Verb::kTare: order.request = Request::kTare; break;
     case Verb::kHold: order.request = Request::kHold; break;
     case Verb::kReset: order.request = Request::kReset; break;
+    case Verb::kCompensate: order.request = Request::kCompensate; break;
+    case Verb::kUncompensate: order.request = Request::kUncompensate; break;
     case Verb::kQuit: order.request = Request::kStop; break;
     case Verb::kRobot: command.robot = robotMove(words, experiment); break;
     case Verb::kCollect: command.collection = collection(words); break;

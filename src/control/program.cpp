@@ -35,6 +35,8 @@ std::string_view name(Request request) noexcept {
     case Request::kHold: return "hold";
     case Request::kTare: return "tare";
     case Request::kReset: return "reset";
+    case Request::kCompensate: return "compensate";
+    case Request::kUncompensate: return "uncompensate";
     case Request::kCount: break;
   }
   return "unknown";
@@ -50,6 +52,7 @@ std::string_view name(Refusal refusal) noexcept {
     case Refusal::kCauseRemains: return "a safety check still fails";
     case Refusal::kOutside: return "its path fails a safety check";
     case Refusal::kUnstable: return "with this base and robot the loop would diverge";
+    case Refusal::kNoCompensation: return "the configuration has no compensation";
     case Refusal::kLoaded: return "the sensor feels too much: calibrate, or take the load away";
     case Refusal::kCount: break;
   }

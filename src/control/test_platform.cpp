@@ -144,9 +144,9 @@ void TestPlatform::readSample(const TickInput& in) noexcept {
 void TestPlatform::observe(std::int64_t periods, bool fresh) noexcept {
   const Compensation& c = config_.compensation;
   const double change = period_ / c.ramp;
-  state_.compensated = c.feed_forward || c.inertia ? std::min(1.0, state_.compensated + change)
-                                                   : std::max(0.0, state_.compensated - change);
-  if (!c.inertia) return;
+  state_.compensated = c.any() && compensating_ ? std::min(1.0, state_.compensated + change)
+                                                : std::max(0.0, state_.compensated - change);
+  if (!c.observer) return;
   constexpr std::int64_t kMost = 10;  // [-] periods; after more it has come to rest
   const Vec6 sent = legLengths(config_.legs, state_.command.counts);
   for (std::int64_t i = 0; i < std::min(periods, kMost); ++i) servo_.advance(sent);
@@ -203,8 +203,7 @@ Refusal TestPlatform::obey(const Order& order) noexcept {
     case Request::kCount: return Refusal::kNone;
     case Request::kArm:
     case Request::kStart:
-      if (order.request == Request::kStart && !config_.admissible &&
-          wantsAdmittance(config_.program))
+      if (order.request == Request::kStart && !admissible() && wantsAdmittance(config_.program))
         return Refusal::kUnstable;
       if (phase == Phase::kDisarmed) {
         if (forbids(state_.tripped)) return Refusal::kCauseRemains;
@@ -237,6 +236,8 @@ Refusal TestPlatform::obey(const Order& order) noexcept {
       taring_ = Tare::kAveraging;
       tare_.reset();
       return Refusal::kNone;
+    case Request::kCompensate: return compensate(true);
+    case Request::kUncompensate: return compensate(false);
     case Request::kReset:
       if (phase != Phase::kStopped) return Refusal::kNotStopped;
       if (state_.tripped.any()) return Refusal::kCauseRemains;
@@ -252,8 +253,21 @@ Refusal TestPlatform::obey(const Order& order) noexcept {
   return Refusal::kNone;
 }
 
+bool TestPlatform::admissible() const noexcept {
+  return compensating_ ? config_.admissible : config_.admissible_uncompensated;
+}
+
+/// A loop that runs is not changed to one that would diverge.
+Refusal TestPlatform::compensate(bool in) noexcept {
+  if (!config_.compensation.any()) return Refusal::kNoCompensation;
+  const bool stable = in ? config_.admissible : config_.admissible_uncompensated;
+  if (!stable && commandsNextState()) return Refusal::kUnstable;
+  compensating_ = in;
+  return Refusal::kNone;
+}
+
 Refusal TestPlatform::refusesAdmittance() const noexcept {
-  if (!config_.admissible) return Refusal::kUnstable;
+  if (!admissible()) return Refusal::kUnstable;
   return feelsLittle() ? Refusal::kNone : Refusal::kLoaded;
 }
 

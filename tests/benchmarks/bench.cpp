@@ -175,12 +175,13 @@ BENCHMARK(SafetyChecks);
 
 /// A controller in the middle of its admittance segment, and the machine as it is then.
 struct UnderWay {
-  Experiment e = experiment("puma_on_table_4_1");  // PUMA, six modes
+  Experiment e;
   TestPlatform platform{e.controller};
   plant::Plant plant{e.plant};
   TickInput in;
 
-  UnderWay() {
+  explicit UnderWay(const std::vector<std::string>& set = {})  // PUMA, six modes
+      : e(loadExperiment(test::configDir() + "/scenarios/puma_on_table_4_1.yaml", set)) {
     in.order.request = Request::kStart;
     while (in.tick < 700) step();
   }
@@ -191,8 +192,8 @@ struct UnderWay {
   }
 };
 
-void ControllerTick(benchmark::State& state) {
-  UnderWay run;
+void tick(benchmark::State& state, const std::vector<std::string>& set) {
+  UnderWay run(set);
   for (auto _ : state) {
     TestPlatform copy = run.platform;  // so that the program never ends
     for (int k = 0; k < 500; ++k) {
@@ -203,7 +204,13 @@ void ControllerTick(benchmark::State& state) {
   }
   state.SetItemsProcessed(state.iterations() * 500);
 }
+void ControllerTick(benchmark::State& state) { tick(state, {}); }
+void ControllerTickCompensated(benchmark::State& state) {
+  tick(state, {"controller.compensation.feed_forward=true", "controller.compensation.observer=true",
+               "controller.compensation.inertia=true"});
+}
 BENCHMARK(ControllerTick);
+BENCHMARK(ControllerTickCompensated);
 
 /// Each tick by itself, in the closed loop: median and 99.9th percentile, the clock's reading
 /// included.

@@ -35,7 +35,8 @@ LoopVerdict judge(const ControllerConfig& controller, const plant::PlantConfig& 
 /// In one line: what grows, how fast, and what would cure it.
 std::string explain(const LoopVerdict& verdict);
 
-/// Judges, and bars admittance control (ControllerConfig::admissible) when it would diverge, unless
+/// Judges, and bars admittance control (ControllerConfig::admissible) when it would diverge, with the
+/// compensation or out of it, unless
 /// it is forced. The explanation then; empty when all is well.
 std::string admit(ControllerConfig& controller, const plant::PlantConfig& plant);
 

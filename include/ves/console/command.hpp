@@ -24,6 +24,8 @@ enum class Verb {
   kStatus,
   kHold,
   kReset,
+  kCompensate,
+  kUncompensate,
   kWait,
   kHelp,
   kQuit

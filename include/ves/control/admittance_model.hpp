@@ -29,9 +29,9 @@ class AdmittanceModel {
   /// `ahead` [s]: motion() is so much later than the step's end, the wrench held.
   AdmittanceModel(const ModalModel& model, double period, double ahead = 0.0);
 
-  /// At rest at x. What the modes cannot express of x stays as a constant offset. With `ahead` it is
-  /// motion() that will have started from rest there: the modes start so much earlier, on the motion
-  /// with M_1 that leads to x; heavily damped ones excepted.
+  /// At rest at x. What the modes cannot express of x stays as a constant offset. With `ahead` it
+  /// is motion() that will have started from rest there: the modes start so much earlier, on the
+  /// motion with M_1 that leads to x; heavily damped ones excepted.
   void reset(const Vec6& x, const Mat6& M_1 = Mat6::Zero()) noexcept;
 
   /// (C.6): the state one period after W began to act.

@@ -47,13 +47,15 @@ inline constexpr int kCalibrationSamples = 100;  // [-] per channel
 
 enum class Request : std::int32_t {
   kNone,
-  kStart,  // take the legs, run the program, come home
-  kStop,   // brake, come home gently, let go
-  kArm,    // take the legs and hold; orders will follow
-  kRun,    // the order's segment
-  kHold,   // brake and hold here
-  kTare,   // what the sensor feels now counts as nothing
-  kReset,  // out of a stop, back to disarmed
+  kStart,         // take the legs, run the program, come home
+  kStop,          // brake, come home gently, let go
+  kArm,           // take the legs and hold; orders will follow
+  kRun,           // the order's segment
+  kHold,          // brake and hold here
+  kTare,          // what the sensor feels now counts as nothing
+  kReset,         // out of a stop, back to disarmed
+  kCompensate,    // what the configuration has of compensation comes in
+  kUncompensate,  // and goes out again: as published
   kCount
 };
 
@@ -62,14 +64,15 @@ std::string_view name(Request request) noexcept;
 /// Why an order was not taken.
 enum class Refusal : std::int32_t {
   kNone,
-  kNotArmed,      // the legs are not ours
-  kBusy,          // something else is running: hold first
-  kArmed,         // the legs are ours already
-  kNotStopped,    // nothing to leave
-  kCauseRemains,  // a check still fails
-  kOutside,       // its path would fail a safety check
-  kLoaded,        // the sensor feels more than admittance control should begin with
-  kUnstable,      // admittance control with this base and robot would diverge
+  kNotArmed,        // the legs are not ours
+  kBusy,            // something else is running: hold first
+  kArmed,           // the legs are ours already
+  kNotStopped,      // nothing to leave
+  kCauseRemains,    // a check still fails
+  kOutside,         // its path would fail a safety check
+  kLoaded,          // the sensor feels more than admittance control should begin with
+  kUnstable,        // admittance control with this base and robot would diverge
+  kNoCompensation,  // the configuration has none
   kCount
 };
 

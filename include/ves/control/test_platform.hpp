@@ -79,13 +79,14 @@ struct ControllerConfig {
     double translation = 0.0;  // [m/s^2] mean
     double rotation = 0.0;     // [rad/s^2] mean
   };
-  Braking gentle_braking = {1.5, 2.5};  // of moves that begin in motion, and before the envelope
-  Braking stop_braking = {5.0, 8.5};    // of a controlled stop
-  int arming_samples = 10;              // [-] consecutive ticks with a new sample before arming
-  StillnessLimits stillness;            // of a calibration
-  double tare_ramp = 1.0;               // [s] over which a tare takes effect
-  bool admissible = true;               // admittance control with this base would not diverge,
-  bool forced = false;                  // or somebody wants it all the same
+  Braking gentle_braking = {1.5, 2.5};   // of moves that begin in motion, and before the envelope
+  Braking stop_braking = {5.0, 8.5};     // of a controlled stop
+  int arming_samples = 10;               // [-] consecutive ticks with a new sample before arming
+  StillnessLimits stillness;             // of a calibration
+  double tare_ramp = 1.0;                // [s] over which a tare takes effect
+  bool admissible = true;                // admittance control with this base would not diverge,
+  bool admissible_uncompensated = true;  // nor would it with the compensation out;
+  bool forced = false;                   // or somebody wants it all the same
 };
 
 struct TickInput {
@@ -157,7 +158,9 @@ class TestPlatform {
   Vec6 reference(const LegMotion& legs) const noexcept;
   Refusal obey(const Order& order) noexcept;
   Refusal accept(const Segment& segment) noexcept;
+  bool admissible() const noexcept;
   Refusal refusesAdmittance() const noexcept;
+  Refusal compensate(bool in) noexcept;
   bool feelsLittle() const noexcept;
   void choosePhase() noexcept;
   void beginProgram(int at) noexcept;
@@ -219,6 +222,7 @@ class TestPlatform {
   Sample sample_;             // the last
   Vec6 load_ = Vec6::Zero();  // [count] what the static load alone would read
   Transform X_IP_measured_;
+  bool compensating_ = true;       // unless told otherwise
   bool legs_solved_ = false;       // forward kinematics found the pose of this sample
   int fresh_ticks_ = 0;            // [-] consecutive ticks with a new sample and no rival
   Request wish_ = Request::kNone;  // kStart or kArm: what to do once the stream is fresh
