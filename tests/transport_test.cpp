@@ -91,7 +91,8 @@ TEST(Gate, LetsNothingOutOfRangeIn) {
   EXPECT_EQ(order->segment.trajectory[2].amplitude, 0.2);
   EXPECT_EQ(order->segment.trajectory[2].motion, AxisMotion::kSine);
   for (const auto change : std::initializer_list<void (*)(operator_t&)>{
-           [](operator_t& m) { m.request = 0; }, [](operator_t& m) { m.request = 8; },
+           [](operator_t& m) { m.request = 0; },
+           [](operator_t& m) { m.request = static_cast<int>(Request::kCount); },
            [](operator_t& m) { m.kind = 5; }, [](operator_t& m) { m.kind = -1; },
            [](operator_t& m) { m.duration = 0.0; }, [](operator_t& m) { m.duration = NAN; },
            [](operator_t& m) { m.interval = -1.0; }, [](operator_t& m) { m.target[3] = INFINITY; },

@@ -99,7 +99,11 @@ const TickState& TestPlatform::tick(const TickInput& input) noexcept {
     state_.command.segment = state_.segment;
     if (step.legs.L.allFinite()) {
       state_.reference = reference(step.legs);
-      state_.command.counts = legCounts(config_.legs, state_.reference);
+      // What rounding leaves goes with the next command; at rest it would only make the legs hum.
+      const bool carries = config_.compensation.observer && state_.compensated == 1.0;
+      if (!carries || !commandsNextState()) carry_.setZero();
+      state_.command.counts = legCounts(config_.legs, state_.reference + carry_);
+      carry_ += state_.reference - legLengths(config_.legs, state_.command.counts);
     }
   }
   state_.command.park = state_.phase != Phase::kStopped && state_.phase != Phase::kStopping;

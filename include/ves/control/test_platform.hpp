@@ -219,8 +219,9 @@ class TestPlatform {
   Quintic<6> bias_path_;     // [count] of a tare
   std::int64_t tare_n_ = 0;  // [-] ticks since it began
   TickState state_;
-  Sample sample_;             // the last
-  Vec6 load_ = Vec6::Zero();  // [count] what the static load alone would read
+  Vec6 carry_ = Vec6::Zero();  // [m] that rounding has left of the commands so far
+  Sample sample_;              // the last
+  Vec6 load_ = Vec6::Zero();   // [count] what the static load alone would read
   Transform X_IP_measured_;
   bool compensating_ = true;       // unless told otherwise
   bool legs_solved_ = false;       // forward kinematics found the pose of this sample
