@@ -13,7 +13,6 @@
 #include <string>
 #include <vector>
 
-#include "ves/analysis/gate.hpp"
 #include "ves/config/experiment.hpp"
 #include "ves/run/run.hpp"
 
@@ -68,7 +67,8 @@ struct Options {
     cli.add_option("--seed", seed, "of the plant's noise")->check(CLI::Range(0, INT32_MAX));
     cli.add_option("--calibration", calibration, "file that a calibration has left");
     cli.add_option("--masses", masses, "file that an identification has left, for the controller");
-    cli.add_option("--servo", servo, "file that a servo identification has left, for the controller");
+    cli.add_option("--servo", servo,
+                   "file that a servo identification has left, for the controller");
   }
   void addForce(CLI::App& cli) {
     cli.add_flag("--force", force, "admittance control even where it would diverge");
@@ -83,16 +83,17 @@ struct Options {
   Experiment load() const {
     std::vector<std::string> all = overrides;
     if (seed >= 0) all.push_back(fmt::format("seed={}", seed));
-    if (force) all.push_back("controller.force=true");
+    if (force) all.push_back("controller.stability=forced");
     return loadExperiment(findScenario(scenario, configFolder()), all, calibration, masses, servo);
   }
 };
 
-/// Admittance control that would diverge is barred, and said so; a program that has it is refused.
-inline void admitOrRefuse(Experiment& experiment) {
-  const std::string why = admit(experiment.controller, experiment.plant);
+/// Says that admittance control would diverge, and refuses a program that has it.
+inline void requireStability(Experiment& experiment) {
+  const std::string why = applyStabilityCheck(experiment);
   if (why.empty()) return;
-  if (wantsAdmittance(experiment.controller.program) && !experiment.controller.forced)
+  if (wantsAdmittance(experiment.controller.program) &&
+      experiment.controller.stability != Stability::kForced)
     throw InputError(fmt::format("{}: {}; --force runs it all the same", experiment.name, why));
   fmt::print(stderr, "warning: {}\n", why);
 }

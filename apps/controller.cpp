@@ -21,9 +21,9 @@ int serve(ControllerOptions& options) {
   catchSignals();
   Experiment experiment = options.load();
   if (options.process.start) {
-    admitOrRefuse(experiment);
+    requireStability(experiment);
   } else {
-    const std::string why = admit(experiment.controller, experiment.plant);
+    const std::string why = applyStabilityCheck(experiment);
     if (!why.empty()) fmt::print(stderr, "ves controller: {}\n", why);
   }
   const RunResult result = runController(experiment, options.process, [](const TickState&) {
@@ -61,7 +61,7 @@ int console(ControllerOptions& options) {
   console.stop = [] { return stop_requested != 0; };
   Experiment experiment = options.load();
   printWarnings(experiment);
-  const std::string why = admit(experiment.controller, experiment.plant);
+  const std::string why = applyStabilityCheck(experiment);
   if (!why.empty()) fmt::print(stderr, "warning: {}\n", why);
   catchSignals();
   prepareBus(options, options.plant);

@@ -2,12 +2,13 @@
 //
 // ves faults: injects every fault of the table and says what happened.
 #include "app.hpp"
+#include "ves/faults/soak.hpp"
 #include "ves/faults/table.hpp"
 
 namespace ves::app {
 namespace {
 
-void printRow(const FaultRow& row, const Seen& seen) {
+void printRow(const FaultRow& row, const FaultOutcome& seen) {
   std::string detected = "-", deviation = "-";
   if (seen.ticks >= 0)
     detected = fmt::format("{} ({:.0f} ms)", seen.ticks,
@@ -21,7 +22,7 @@ void printRow(const FaultRow& row, const Seen& seen) {
   std::fflush(stdout);
 }
 
-void printMarkdownRow(const FaultRow& row, const Seen& seen) {
+void printMarkdownRow(const FaultRow& row, const FaultOutcome& seen) {
   fmt::print("| {} | {} | {} | {}{} | {} | {} |\n", row.id, row.fault, row.expected,
              seen.as_expected ? "" : "**not as expected:** ", seen.what,
              seen.ticks < 0 ? std::string("-")
@@ -34,12 +35,12 @@ void printMarkdownRow(const FaultRow& row, const Seen& seen) {
 
 int kill(const std::filesystem::path& config, const std::filesystem::path& programs, int times) {
   const auto rows = faultTable(config, programs);
-  const auto row = std::find_if(rows.begin(), rows.end(),
-                                [](const FaultRow& r) { return std::string(r.id) == "F15"; });
+  const auto row =
+      std::find_if(rows.begin(), rows.end(), [](const FaultRow& r) { return r.id == "F15"; });
   int good = 0;
   for (int i = 0; i < times && !stop_requested; ++i) {
     good += row->run().as_expected;
-    fmt::print(stderr, "\r  {} of {} killings ended with the legs at rest", good, i + 1);
+    fmt::print(stderr, "\r  {} of {} kill trials passed", good, i + 1);
   }
   fmt::print(stderr, "\n");
   return good == times ? kDone : kTripped;
@@ -86,7 +87,7 @@ int main(int argc, char** argv) {
     const auto rows = faultTable(config, programs);
     for (const std::string& id : only)
       if (std::none_of(rows.begin(), rows.end(), [&](const FaultRow& r) { return id == r.id; }))
-        throw InputError(fmt::format("'{}': no such row, want F1 to F38 as --list names them", id));
+        throw InputError(fmt::format("'{}': no such row, want one that --list names", id));
     if (!list && !lockstep) enterPrivateBus();
     if (times > 0) return app::kill(config, programs, times);
     if (markdown)
@@ -101,7 +102,7 @@ int main(int argc, char** argv) {
         continue;
       }
       if ((lockstep && row.processes) || app::stop_requested) continue;
-      const Seen seen = row.run();
+      const FaultOutcome seen = row.run();
       (markdown ? app::printMarkdownRow : app::printRow)(row, seen);
       ++ran;
       missed += !seen.as_expected;

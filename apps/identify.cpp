@@ -27,6 +27,15 @@ auto orRefuse(const std::string& about, const F& f) {
   }
 }
 
+/// Writes YAML that `read` takes; what it would refuse is not written.
+int keep(const std::string& file, const std::string& yaml, const auto& read) {
+  const Value written = parseDocument(yaml, file);
+  read(Section(written, ""));
+  app::writeFile(file, yaml);
+  fmt::print("{}\n", file);
+  return app::kDone;
+}
+
 int plan(const std::string& scenario, const PosePlanOptions& options, double speed,
          std::string file) {
   const std::filesystem::path base = findScenario(scenario, app::configFolder());
@@ -113,11 +122,7 @@ int masses(const std::string& log, const std::string& file) {
   const std::string yaml =
       write(record,
             text + "\nBelow: one set of masses that has all of these. Single values mean little.");
-  const Value written = parseDocument(yaml, file);
-  readMasses(Section(written, ""));  // what would be refused is not written
-  app::writeFile(file, yaml);
-  fmt::print("{}\n", file);
-  return app::kDone;
+  return keep(file, yaml, readMasses);
 }
 
 /// The servos from any log in which every leg moves both ways.
@@ -138,12 +143,9 @@ int servo(const std::string& log, const std::string& file) {
     record.length.push_back(legLengths(c.legs, read));
     if (record.length.size() > longest.length.size()) longest = record;
   }
-  ServoEstimate found;
-  try {
-    found = identifyServo(c.servo, static_cast<double>(c.period) * kSecondPerNanosecond, longest);
-  } catch (const std::domain_error& error) {
-    throw InputError(fmt::format("{}: {}", log, error.what()));
-  }
+  const ServoEstimate found = orRefuse(log, [&] {
+    return identifyServo(c.servo, static_cast<double>(c.period) * kSecondPerNanosecond, longest);
+  });
   fmt::print("{:>3}{:>22}{:>22}{:>20}{:>20}{:>12}\n", "leg", "extending [1/s]", "retracting [1/s]",
              "tau [ms]", "delay [ms]", "rest [um]");
   for (int i = 0; i < kLegs; ++i) {
@@ -157,11 +159,7 @@ int servo(const std::string& log, const std::string& file) {
   }
   if (file.empty()) return app::kDone;
   const std::string yaml = write({std::time(nullptr), found.servo, found.deviation});
-  const Value written = parseDocument(yaml, file);
-  readServo(Section(written, ""));  // what would be refused is not written
-  app::writeFile(file, yaml);
-  fmt::print("{}\n", file);
-  return app::kDone;
+  return keep(file, yaml, readServo);
 }
 
 int iterate(const app::Options& load, const IterativeOptions& options, const std::string& file) {

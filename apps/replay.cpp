@@ -23,6 +23,7 @@ int main(int argc, char** argv) {
     std::optional<Experiment> other;
     if (!with.empty()) {
       other = loadExperiment(findScenario(with, app::configFolder()));
+      applyStabilityCheck(*other);
       options.with = &*other;
     }
     Phase phase = Phase::kDisarmed;
@@ -38,7 +39,9 @@ int main(int argc, char** argv) {
     });
     fmt::print("{}: {} (configuration {}, version {}), {} ticks replayed\n", log, r.name, r.hash,
                r.version, r.ticks);
-    if (!r.barred.empty()) fmt::print("admittance control was barred: {}\n", r.barred);
+    if (r.stability == Stability::kUnstable || r.stability == Stability::kUnknown)
+      fmt::print("admittance control was refused: the stability of its loop was '{}'\n",
+                 kStabilityNames[static_cast<std::size_t>(r.stability)]);
     if (r.cause != Check::kCount)
       fmt::print("stopped in tick {} by: {}\n", r.cause_tick, name(r.cause));
     if (other)

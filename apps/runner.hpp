@@ -61,7 +61,7 @@ inline void prepareBus(RunnerOptions& options, bool alone) {
 inline int runExperiment(RunnerOptions& options) {
   Experiment experiment = options.load();
   printWarnings(experiment);
-  admitOrRefuse(experiment);
+  requireStability(experiment);
   LaunchOptions launch = prepareFolder(options, experiment);
   catchSignals();
 

@@ -7,6 +7,7 @@
 
 #include "runner.hpp"
 #include "ves/analysis/appendix_e.hpp"
+#include "ves/analysis/gate.hpp"
 #include "ves/report/gnuplot.hpp"
 
 namespace {
@@ -31,7 +32,7 @@ int showLoop(const Experiment& e) {
     }
     fmt::print("\n");
   }
-  const LoopVerdict v = judge(e.controller, e.plant);
+  const LoopVerdict v = assessStability(e.controller, e.plant);
   if (!v.stable) {
     fmt::print("{}\n", explain(v));
     return app::kTripped;
@@ -59,21 +60,17 @@ struct Parameter {
 const Parameter kParameters[] = {
     {"mass", "robot's inertia, times its own", 0.0, 10000.0,
      [](Loop& l, const Loop& o, double v) {
-       l.robot_P.mass = v * o.robot_P.mass;
-       l.robot_P.I_Bcm_B = v * o.robot_P.I_Bcm_B;
+       l.robot_P = heavier(v, o.robot_P);
        l.believed.robot_P = l.robot_P;
      }},
     {"mass_error", "robot's inertia, times what the controller believes", 0.0, 100.0,
-     [](Loop& l, const Loop& o, double v) {
-       l.robot_P.mass = v * o.robot_P.mass;
-       l.robot_P.I_Bcm_B = v * o.robot_P.I_Bcm_B;
-     }},
+     [](Loop& l, const Loop& o, double v) { l.robot_P = heavier(v, o.robot_P); }},
     {"rate", "controller rate [Hz]", 1.0, 1000.0,
      [](Loop& l, const Loop&, double v) { l.period = 1.0 / v; }},
     {"K_P", "K_P, times its own", 0.0, 100.0,
      [](Loop& l, const Loop& o, double v) {
        l.velocity_gain = v * o.velocity_gain;
-       l.believed.velocity_gain = v * o.believed.velocity_gain;
+       l.believed.setGain(v * o.believed.gain());
      }},
     {"gain_error", "servo gain, times what the controller believes", 0.01, 100.0,
      [](Loop& l, const Loop& o, double v) { l.velocity_gain = v * o.velocity_gain; }},
@@ -82,7 +79,9 @@ const Parameter kParameters[] = {
     {"filter", "cut-off of Filter 3 [rad/s]", 0.0, 10000.0,
      [](Loop& l, const Loop&, double v) { l.filter_cutoff = v; }},
     {"sensor", "cut-off of the sensor's filter [Hz]", 0.1, 10000.0,
-     [](Loop& l, const Loop&, double v) { l.sensor_cutoff = 2.0 * M_PI * v; }},
+     [](Loop& l, const Loop&, double v) {
+       l.sensor_cutoff = l.believed.servo.sensor_cutoff = 2.0 * M_PI * v;
+     }},
     {"frequency", "frequencies of the base, times their own", 0.0, 1000.0,
      [](Loop& l, const Loop& o, double v) {
        l.base.stiffness = v * v * o.base.stiffness;

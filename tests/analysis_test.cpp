@@ -274,7 +274,7 @@ const std::vector<std::string> kDiverging = {"base.keep_modes=6", "legs.filters=
 
 TEST(Gate, NamesWhatGrowsAndWhatItNamesCuresIt) {
   const Experiment e = test::experiment("srms_deploy_doss", kDiverging);
-  const LoopVerdict v = judge(e.controller, e.plant);
+  const LoopVerdict v = assessStability(e.controller, e.plant);
   ASSERT_FALSE(v.stable);
   EXPECT_GT(v.worst.growth, 0.0);
   const std::string said = explain(v);
@@ -284,7 +284,7 @@ TEST(Gate, NamesWhatGrowsAndWhatItNamesCuresIt) {
     std::vector<std::string> all = kDiverging;
     all.push_back(set);
     const Experiment cured = test::experiment("srms_deploy_doss", all);
-    return judge(cured.controller, cured.plant, false).stable;
+    return assessStability(cured.controller, cured.plant, false).stable;
   };
   EXPECT_TRUE(with("base.keep_modes=" + std::to_string(v.stable_modes)));
   EXPECT_FALSE(with("base.keep_modes=" + std::to_string(v.stable_modes + 1)));
@@ -298,7 +298,7 @@ TEST(Gate, LooksAtEveryPoseOfTheRobot) {
     Experiment e = test::experiment("doss_on_table_4_1",
                                     {"program=[{admittance: {duration_s: 5}" + robot + "}]"});
     e.controller.admittance.Phi *= lighter;
-    return judge(e.controller, e.plant, false).stable;
+    return assessStability(e.controller, e.plant, false).stable;
   };
   double lo = 1.0, hi = 100.0;
   ASSERT_TRUE(stable(lo, ""));
@@ -313,9 +313,9 @@ TEST(Gate, LooksAtEveryPoseOfTheRobot) {
 }
 
 TEST(Gate, BarsAdmittanceControlUnlessForced) {
-  Experiment e = test::experiment("srms_deploy_doss", kDiverging);
-  EXPECT_NE(admit(e.controller, e.plant), "");
-  EXPECT_FALSE(e.controller.admissible);
+  Experiment e = test::unassessed("srms_deploy_doss", kDiverging);
+  EXPECT_NE(applyStabilityCheck(e), "");
+  EXPECT_EQ(e.controller.stability, Stability::kUnstable);
   test::Rig rig(e);
   rig.arm();
   rig.tick(Request::kRun, test::segment(SegmentKind::kAdmittance, 5.0));
@@ -325,17 +325,17 @@ TEST(Gate, BarsAdmittanceControlUnlessForced) {
   EXPECT_EQ(rig.state().phase, Phase::kRunning);
 
   Experiment forced = e;
-  forced.controller.forced = true;
-  EXPECT_NE(admit(forced.controller, forced.plant), "");
-  EXPECT_TRUE(forced.controller.admissible);
-  Experiment good = test::experiment("srms_deploy_doss");
-  EXPECT_EQ(admit(good.controller, good.plant), "");
-  EXPECT_TRUE(good.controller.admissible);
+  forced.controller.stability = Stability::kForced;
+  EXPECT_NE(applyStabilityCheck(forced), "");
+  EXPECT_EQ(forced.controller.stability, Stability::kForced);
+  Experiment good = test::unassessed("srms_deploy_doss");
+  EXPECT_EQ(applyStabilityCheck(good), "");
+  EXPECT_EQ(good.controller.stability, Stability::kStable);
 }
 
 TEST(Gate, ProgramThatHasItDoesNotBegin) {
-  Experiment e = test::experiment("srms_deploy_doss", kDiverging);
-  admit(e.controller, e.plant);
+  Experiment e = test::unassessed("srms_deploy_doss", kDiverging);
+  applyStabilityCheck(e);
   test::Rig rig(e);
   rig.tick(Request::kStart);
   EXPECT_EQ(rig.state().refusal, Refusal::kUnstable);
@@ -358,7 +358,7 @@ TEST(Gate, LooksAtThePosesBetweenTheEndsOfAMove) {
          "program=[{move: {}}, {admittance: {duration_s: 20}, robot: [{at_s: 1, duration_s: 15, "
          "joint: joint_3, to_deg_or_m: " +
              to + "}]}]"});
-    return judge(e.controller, e.plant, false).stable;
+    return assessStability(e.controller, e.plant, false).stable;
   };
   EXPECT_TRUE(stable("-180"));
   EXPECT_FALSE(stable("0"));
@@ -389,13 +389,13 @@ TEST(Gate, LooksAtEachMotionWhateverElseThereIs) {
 TEST(Gate, TakesTheRobotAsTheControllerKnowsIt) {
   Experiment e = test::experiment("srms_deploy_doss", kDiverging);
   e.plant.payload.robot = RobotModel();  // what a URDF without masses would say
-  EXPECT_FALSE(judge(e.controller, e.plant, false).stable);
+  EXPECT_FALSE(assessStability(e.controller, e.plant, false).stable);
 }
 
 TEST(Gate, LetsAFreeBaseDriftAndStillNamesCures) {
   const auto verdict = [](std::vector<std::string> sets) {
     const Experiment e = test::experiment("puma_on_table_4_1", std::move(sets));
-    return judge(e.controller, e.plant);
+    return assessStability(e.controller, e.plant);
   };
   EXPECT_TRUE(
       verdict({"base.stiffness_diagonal=[0,0,0,0,0,0]", "base.damping_diagonal=[0,0,0,0,0,0]"})
@@ -419,14 +419,14 @@ TEST(Margins, OfARobotWithoutMassAreTheMostThatIsLookedFor) {
 TEST(Gate, ScenariosOfTheRepositoryPass) {
   for (const auto& entry : std::filesystem::directory_iterator(test::configDir() + "/scenarios")) {
     const Experiment e = loadExperiment(entry.path());
-    EXPECT_TRUE(judge(e.controller, e.plant, false).stable) << entry.path();
+    EXPECT_TRUE(assessStability(e.controller, e.plant, false).stable) << entry.path();
   }
 }
 
 TEST(Gate, WhatIsForcedStopsItselfEvenWhereTheEnvelopeHoldsIt) {
   for (const char* scenario : {"srms_deploy_puma", "srms_unberth_puma", "srms_capture_puma"}) {
     const Experiment e = test::experiment(
-        scenario, {"base.keep_modes=6", "legs.filters=outputs", "controller.force=true",
+        scenario, {"base.keep_modes=6", "legs.filters=outputs", "controller.stability=forced",
                    "program=[{move: {}}, {calibration: {}}, {admittance: {duration_s: 60}}]"});
     const RunResult result = runLockstep(e, nullptr, {});
     EXPECT_EQ(result.phase, Phase::kStopped) << scenario;

@@ -10,6 +10,7 @@
 #include "support/robots.hpp"
 #include "ves/console/command.hpp"
 #include "ves/realtime/realtime.hpp"
+#include "ves/run/bus_observer.hpp"
 
 namespace ves {
 namespace {
@@ -197,63 +198,24 @@ TEST_F(Console, BadInputIsSaidBeforeAnythingStarts) {
 
 // --- Controllers come and go ---------------------------------------------------------------------
 
-/// What is heard on the bus of the legs and of the controllers.
-struct Witness {
-  Bus bus{kDefaultUrl};
-  std::int64_t engaged = 0, states = 0;
-  std::int64_t controller = 0;
-  Phase phase = Phase::kDisarmed;
-  Vec6 legs = Vec6::Zero();
-
-  Witness() {
-    bus.subscribe("VES_(STATE|LEG_COMMAND|TRUTH)",
-                  [this](const std::string& channel, const void* data, std::uint32_t size) {
-                    if (const auto m = decode<truth_t>(data, size)) legs = Vec6::Map(m->leg);
-                    if (const auto m = decode<leg_command_t>(data, size)) engaged += m->engaged;
-                    if (const auto m = decode<state_t>(data, size)) {
-                      ++states;
-                      controller = m->header.source;
-                      phase = static_cast<Phase>(m->phase);
-                    }
-                    (void)channel;
-                  });
-  }
-  /// Listens until `what` holds; false after half a minute.
-  bool until(const std::function<bool()>& what) {
-    const std::int64_t end = monotonicNow() + 30'000'000'000;
-    while (!what() && monotonicNow() < end) bus.wait(100);
-    return what();
-  }
-  /// Where the legs are once they have stopped: for 40 messages of the plant in a row.
-  Vec6 rest() {
-    Vec6 last = legs;
-    int still = 0;
-    until([&] {
-      still = (legs - last).cwiseAbs().maxCoeff() < 1e-6 ? still + 1 : 0;
-      last = legs;
-      return still > 40;
-    });
-    return legs;
-  }
-};
-
 TEST_F(Console, AKilledControllerLeavesTheLegsWhereTheyAreAndItsSuccessorWaits) {
   enterPrivateBus();
-  Witness w;
+  BusObserver w;
   Process plant = start("plant", {"z_sine"});
   {
     Process first = start("controller", {"z_sine", "--start"});
-    ASSERT_TRUE(w.until([&] { return w.phase == Phase::kRunning && w.engaged > 250; }));
+    ASSERT_TRUE(w.until([&] { return w.phase() == Phase::kRunning && w.engaged > 250; }));
     first.signal(SIGKILL);
     EXPECT_EQ(first.wait(), -SIGKILL);
   }
-  const Vec6 held = w.rest();
+  ASSERT_TRUE(w.rests());
+  const Vec6 held = w.legs;
   const std::int64_t dead = w.controller, engaged = w.engaged;
   Process second = start("controller", {"z_sine", "--no-menu"});
   ASSERT_TRUE(w.until([&] { return w.controller != dead; }));
   const std::int64_t states = w.states;
   ASSERT_TRUE(w.until([&] { return w.states > states + 200; }));
-  EXPECT_EQ(w.phase, Phase::kDisarmed);
+  EXPECT_EQ(w.phase(), Phase::kDisarmed);
   EXPECT_EQ(w.engaged, engaged);
   EXPECT_LT((w.legs - held).cwiseAbs().maxCoeff(), 0.2e-3);  // counts of 0.07 mm
   second.signal(SIGINT);
@@ -262,7 +224,7 @@ TEST_F(Console, AKilledControllerLeavesTheLegsWhereTheyAreAndItsSuccessorWaits) 
 
 TEST_F(Console, OrdersOverTheBusAreForOneController) {
   enterPrivateBus();
-  Witness w;
+  BusObserver w;
   Process plant = start("plant", {"z_sine"});
   Process controller = start("controller", {"z_sine", "--no-menu"});
   ASSERT_TRUE(w.until([&] { return w.states > 20; }));
@@ -274,10 +236,10 @@ TEST_F(Console, OrdersOverTheBusAreForOneController) {
   order(Request::kArm, w.controller + 1, 0);
   std::int64_t states = w.states;
   ASSERT_TRUE(w.until([&] { return w.states > states + 50; }));
-  EXPECT_EQ(w.phase, Phase::kDisarmed);
+  EXPECT_EQ(w.phase(), Phase::kDisarmed);
   ASSERT_TRUE(w.until([&] {
     order(Request::kArm, w.controller, 1);  // again and again: it counts once
-    return w.phase == Phase::kArmed;
+    return w.phase() == Phase::kArmed;
   }));
   order(Request::kStop, w.controller, 2);
   while (controller.running()) w.bus.wait(20);
@@ -290,16 +252,16 @@ TEST_F(Console, LcmLogplayerPlaysSamplesIntoALiveController) {
   const Output recorded = sh(app("run") + "z_sine --no-plots " + patient() + " --set '" +
                              kShortProgram + "'" + out("a"));
   ASSERT_EQ(recorded.status, 0) << recorded.text;
-  Witness w;
+  BusObserver w;
   Process controller = start("controller", {"z_sine", "--start", "--set", kShortProgram});
   Process player("/usr/bin/lcm-logplayer",
                  {"--regexp", "VES_SAMPLE", (folder_ / "a/run.lcmlog").string()});
   // The recorded legs do what this controller asks, a little earlier or later: it follows, and
   // arms, moves and comes home as it did then.
-  EXPECT_TRUE(w.until([&] { return w.phase == Phase::kRunning; }));
+  EXPECT_TRUE(w.until([&] { return w.phase() == Phase::kRunning; }));
   while (controller.running()) w.bus.wait(20);
   w.bus.drain();
-  EXPECT_NE(w.phase, Phase::kDisarmed);
+  EXPECT_NE(w.phase(), Phase::kDisarmed);
   player.signal(SIGTERM);
   player.wait();
 }

@@ -8,8 +8,10 @@
 #include <unsupported/Eigen/MatrixFunctions>
 
 #include "support/poses.hpp"
+#include "support/rig.hpp"
 #include "support/robots.hpp"
 #include "ves/config/experiment.hpp"
+#include "ves/control/gravity_compensation.hpp"
 #include "ves/robot/newton_euler.hpp"
 #include "ves/srms/modes.hpp"
 
@@ -19,9 +21,7 @@ namespace {
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kT = 0.01;  // [s]
 
-Experiment experiment(const std::string& name, const std::vector<std::string>& set = {}) {
-  return loadExperiment(test::configDir() + "/scenarios/" + name + ".yaml", set);
-}
+using test::experiment;
 
 Mat6 randomDefinite(unsigned seed, double scale) {
   std::mt19937 random(seed);
@@ -110,7 +110,7 @@ TEST(GravityCompensation, IsTheSumOfWeightsAtKdlsPositions) {
       }
       add(16.0, load.X_PR.p);
       add(5.0, load.X_PS.p + Vec3(0.0, 0.0, 0.031));  // the top plate, above the sensor's origin
-      const Wrench out = gravityCompensation(load, q, R_IP, g_I);
+      const Wrench out = gravityCompensation(load, R_IP, staticWrench(load, q, R_IP, g_I));
       ASSERT_LT((out.f - f).norm() + (out.n - n).norm(), 1e-9);
     }
   }
@@ -119,8 +119,9 @@ TEST(GravityCompensation, IsTheSumOfWeightsAtKdlsPositions) {
 TEST(GravityCompensation, IsTheHandSumAtHome) {  // m g, and r x m g of each plate and link
   const Experiment e = experiment("puma_tilt");
   JointVector zero = JointVector::Zero();
-  const Wrench F_Po =
-      gravityCompensation(e.controller.payload, zero, Mat3::Identity(), {0, 0, -9.81});
+  const Payload& load = e.controller.payload;
+  const Wrench F_Po = gravityCompensation(
+      load, Mat3::Identity(), staticWrench(load, zero, Mat3::Identity(), {0, 0, -9.81}));
   EXPECT_NEAR(F_Po.f.z(), -9.81 * (52.45 + 16.0 + 5.0), 1e-9);
   EXPECT_NEAR(F_Po.f.head<2>().norm(), 0.0, 1e-9);
   // AKB pose of zeros: moment of links 1 to 6 about frame 0 is (60.31978, -36.98581), of the
@@ -131,11 +132,10 @@ TEST(GravityCompensation, IsTheHandSumAtHome) {  // m g, and r x m g of each pla
 
 TEST(GravityCompensation, VanishesInSpace) {
   const Experiment e = experiment("puma_tilt");
-  EXPECT_EQ(gravityCompensation(e.controller.payload, e.plant.initial_joints,
-                                rotation({0.3, 0.2, 0.1}), Vec3::Zero())
-                .stacked()
-                .norm(),
-            0.0);
+  const Mat3 R_IP = rotation({0.3, 0.2, 0.1});
+  const Wrench F_So_S =
+      staticWrench(e.controller.payload, e.plant.initial_joints, R_IP, Vec3::Zero());
+  EXPECT_EQ(gravityCompensation(e.controller.payload, R_IP, F_So_S).stacked().norm(), 0.0);
 }
 
 // --- Admittance model ---------------------------------------------------------------------------

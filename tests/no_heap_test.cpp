@@ -7,14 +7,13 @@
 #include <thread>
 
 #include "support/malloc_guard.hpp"
+#include "support/rig.hpp"
 #include "ves/run/run.hpp"
 
 namespace ves {
 namespace {
 
-Experiment experiment(const std::string& name, const std::vector<std::string>& set = {}) {
-  return loadExperiment(std::string(VES_TEST_CONFIG_DIR) + "/scenarios/" + name + ".yaml", set);
-}
+using test::experiment;
 
 TEST(MallocGuard, CountsAnAllocation) {  // the test that the others can fail
   test::MallocGuard guard;
@@ -80,10 +79,11 @@ TEST(NoHeapOverTheBus, InThePeriodicPathsOfBothProcesses) {
     GTEST_SKIP() << error.what();
   }
   // A loaded machine may sleep through samples; this is not about that.
-  const Experiment e = experiment(
-      "free_decay", {"program=[{admittance: {duration_s: 1}}]", "safety.stale_ticks=1000",
-                     "safety.stall_ticks=1000", "safety.overruns_per_second=1000",
-                     "safety.position_error_still_m=0.1", "safety.reading_jump_m=1"});
+  const Experiment e =
+      experiment("free_decay", {"program=[{calibration: {}}, {admittance: {duration_s: 1}}]",
+                                "safety.stale_ticks=1000", "safety.stall_ticks=1000",
+                                "safety.overruns_per_second=1000",
+                                "safety.position_error_still_m=0.1", "safety.reading_jump_m=1"});
   constexpr int kSettled = 20;  // [-] turns of the loop
   std::atomic<bool> stop = false;
   std::int64_t plant_calls = -1, plant_turns = 0;

@@ -6,6 +6,7 @@
 #include <complex>
 
 #include "support/poses.hpp"
+#include "support/rig.hpp"
 #include "support/robots.hpp"
 #include "ves/config/experiment.hpp"
 #include "ves/control/gravity_compensation.hpp"
@@ -16,9 +17,7 @@ namespace {
 
 constexpr double kUpdate = 1.023e-3;  // [s]
 
-Experiment experiment(const std::string& name, const std::vector<std::string>& overrides = {}) {
-  return loadExperiment(test::configDir() + "/scenarios/" + name + ".yaml", overrides);
-}
+using test::experiment;
 
 // --- LegSlave ------------------------------------------------------------------------------------
 

@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "support/refusal.hpp"
+#include "support/rig.hpp"
 #include "ves/replay/replay.hpp"
 #include "ves/run/run.hpp"
 #include "ves/transport/channels.hpp"
@@ -30,7 +31,7 @@ class Replay : public testing::Test {
     return (fs::temp_directory_path() / ("ves_replay_" + std::to_string(getpid()) + what)).string();
   }
   static Experiment experiment(const std::string& name, const std::vector<std::string>& set = {}) {
-    return loadExperiment(std::string(VES_TEST_CONFIG_DIR) + "/scenarios/" + name + ".yaml", set);
+    return test::experiment(name, set);
   }
 
   /// Copies the log, event by event; `edit` may change an event, or drop it by returning false.

@@ -283,7 +283,7 @@ TEST(Safety, AdmittanceRunPushedAgainstItsLimitsComesToRestInside) {
       // The envelope brakes gently: no jerk into the wall.
       const Vec6 change = rig.state().motion.x_dot - last;
       EXPECT_LT(change.head<3>().norm(),
-                3.0 * e.controller.gentle_braking.translation * 0.01 + 0.1);
+                3.0 * e.controller.gentle.braking.translation * 0.01 + 0.1);
       last = rig.state().motion.x_dot;
     }
     EXPECT_TRUE(slowed);

@@ -97,8 +97,9 @@ TEST(SweepPlan, RefusesByName) {
 class Sweep : public test::Programs {
  protected:
   static constexpr const char* kRuns =
-      "free_decay --set 'program=[{move: {}},{admittance: {duration_s: 1}}]' "
-      "--vary legs.tau_s=0.005,0.0064,0.008 --draw legs.K_D=0:0 --runs 4 ";
+      "free_decay --set 'program=[{calibration: {}},{move: {to: {x_m: 0.01}}},"
+      "{admittance: {duration_s: 1}}]' "
+      "--vary legs.tau_s=0.005,0.0064,0.008 --draw reality.gain_extend=0.95:1.05 --runs 4 ";
   test::Output sweep(const std::string& arguments) { return test::sh(app("sweep") + arguments); }
   std::string csv(const std::string& folder) {
     return test::readText((folder_ / folder / "sweep.csv").string());
@@ -109,7 +110,14 @@ TEST_F(Sweep, RowsDoNotDependOnTheWorkersNorOnAKill) {
   ASSERT_EQ(sweep(kRuns + out("one") + "--workers 1").status, 0);
   ASSERT_EQ(sweep(kRuns + out("three") + "--workers 3").status, 0);
   const std::string all = csv("one");
-  EXPECT_EQ(rows(folder_ / "one/sweep.csv").size(), 12u);
+  const auto one = rows(folder_ / "one/sweep.csv");
+  EXPECT_EQ(one.size(), 12u);
+  std::set<std::string> errors;
+  for (auto row : one) {
+    EXPECT_EQ(row["ended"], "parked");
+    errors.insert(row["x_error_max_m"]);
+  }
+  EXPECT_EQ(errors.size(), 12u);  // every draw is a run of its own
   EXPECT_EQ(all, csv("three"));
 
   // As a kill leaves it: some rows, out of order, the last one cut short.

@@ -59,7 +59,8 @@ std::vector<JointVector> programPoses(const Program& program, const plant::Plant
   return out;
 }
 
-LoopVerdict judge(const ControllerConfig& controller, const plant::PlantConfig& plant, bool cures) {
+LoopVerdict assessStability(const ControllerConfig& controller, const plant::PlantConfig& plant,
+                            bool cures) {
   LoopVerdict out;
   out.modes = static_cast<int>(controller.admittance.stiffness.size());
   out.stable_modes = out.modes;
@@ -71,7 +72,10 @@ LoopVerdict judge(const ControllerConfig& controller, const plant::PlantConfig& 
     for (const JointVector& q : poses) {
       const Loop loop = loopOf(controller, plant, q, direction);
       if (!decays(loop)) out.stable = false;
-      if (!cures && !out.stable) return out;
+      if (!cures) {
+        if (!out.stable) return out;
+        continue;
+      }
       const double r = radius(loop);
       if (r <= most) continue;
       most = r;
@@ -119,16 +123,21 @@ std::string explain(const LoopVerdict& v) {
       v.direction == Direction::kExtending ? "extending" : "retracting", cure);
 }
 
-std::string admit(ControllerConfig& controller, const plant::PlantConfig& plant) {
+std::string applyStabilityCheck(ControllerConfig& controller, const plant::PlantConfig& plant) {
+  const auto verdict = [&](const ControllerConfig& c) {
+    return assessStability(c, plant, false).stable ? Stability::kStable : Stability::kUnstable;
+  };
+  const bool forced = controller.stability == Stability::kForced;
+  const Stability as_is = verdict(controller);
+  controller.stability_uncompensated = as_is;
   if (controller.compensation.any()) {
     ControllerConfig published = controller;
     published.compensation = {};
-    controller.admissible_uncompensated =
-        controller.forced || judge(published, plant, false).stable;
+    controller.stability_uncompensated = verdict(published);
   }
-  if (judge(controller, plant, false).stable) return {};
-  controller.admissible = controller.forced;
-  return explain(judge(controller, plant));
+  controller.stability = as_is;
+  if (forced) controller.stability = controller.stability_uncompensated = Stability::kForced;
+  return as_is == Stability::kStable ? "" : explain(assessStability(controller, plant));
 }
 
 }  // namespace ves

@@ -7,8 +7,10 @@
 #include <cmath>
 #include <complex>
 #include <unsupported/Eigen/MatrixFunctions>
+#include <vector>
 
 #include "ves/math/second_order.hpp"
+#include "ves/plant/nominal_servo.hpp"
 
 namespace ves {
 namespace {
@@ -58,10 +60,12 @@ Mechanics mechanicsOf(const Loop& loop) {
 }
 
 /// One direction over a controller period: z <- step z + from_command u. z = {mechanics, v_end, the
-/// first reading of the pair to come, X(k-1) .. X(k-4)}.
+/// first reading of the pair to come, X(k-1) .. X(k-4)}, without what nothing reads: Filter 3 where
+/// it is absent, and the earlier readings where there is no derivative gain.
 struct Channel {
   MatrixXd step;
   VectorXd from_command;
+  Index sensor = 0;  // of the sensor's output in z; the length is the first
 };
 
 Channel channelOf(const Loop& loop) {
@@ -111,67 +115,43 @@ Channel channelOf(const Loop& loop) {
     all = pass(to_tick - before) * read * pass(before) * all;
   else
     all = pass(to_tick) * all;
-  return {all.topLeftCorner(kSize, kSize), all.block(0, kCommand, kSize, 1)};
+  std::vector<Index> read_states;
+  for (Index i = 0; i < kSize; ++i) {
+    const bool filter = i >= Mechanics::kFilter && i < Mechanics::kSensor;
+    if ((!filter || loop.filter_cutoff > 0.0) && (i < kHistory || loop.derivative_gain > 0.0))
+      read_states.push_back(i);
+  }
+  const auto sensor = std::find(read_states.begin(), read_states.end(), Mechanics::kSensor);
+  return {all(read_states, read_states), all(read_states, kCommand), sensor - read_states.begin()};
 }
 
 /// The controller's servo model of one direction over a period: z <- step z + from_command u. z =
 /// {length, speed, v_end, sensor (2)}; a reading replaces the length at every tick.
 Channel observerOf(const Loop& loop) {
   constexpr Index kLength = 0, kSpeed = 1, kHeld = 2, kSensor = 3, kSize = 5, kCommand = kSize;
-  const Loop::Believed& own = loop.believed;
-  const double w = loop.sensor_cutoff;
-  const double update = static_cast<double>(plant::kUpdatePeriod) * kSecondPerNanosecond;
-  const double age = 0.5 * static_cast<double>(plant::kTransducerPeriod) * kSecondPerNanosecond;
-  const int updates = std::max(1, static_cast<int>(std::lround(loop.period / update)));
+  const ServoModel& servo = loop.believed.servo;
+  const double w = servo.sensor_cutoff, tau = servo.tau(0), K = servo.extend(0);
+  const int updates = std::max(1, static_cast<int>(std::lround(loop.period / servo.update)));
   const double h = loop.period / updates;
 
   MatrixXd generator = MatrixXd::Zero(kSize + 1, kSize + 1);
   generator(kLength, kSpeed) = 1.0;
-  generator(kSpeed, kSpeed) = -1.0 / own.tau;
-  generator(kSpeed, kHeld) = 1.0 / own.tau;
+  generator(kSpeed, kSpeed) = -1.0 / tau;
+  generator(kSpeed, kHeld) = 1.0 / tau;
   generator(kSensor, kSensor + 1) = 1.0;
   generator(kSensor + 1, kSensor) = -w * w;
   generator(kSensor + 1, kSensor + 1) = -M_SQRT2 * w;
   generator.row(kSensor + 1) += w * w * generator.row(kSpeed);
   MatrixXd next = MatrixXd::Identity(kSize + 1, kSize + 1);
   next.row(kHeld).setZero();
-  next(kHeld, kLength) = -own.velocity_gain;
-  next(kHeld, kSpeed) = own.velocity_gain * (age - own.derivative);
-  next(kHeld, kCommand) = own.velocity_gain;
+  next(kHeld, kLength) = -K;
+  next(kHeld, kSpeed) = K * (servo.reading_age - servo.derivative);
+  next(kHeld, kCommand) = K;
 
   const MatrixXd half = (generator * 0.5 * h).exp(), whole = half * half;
   MatrixXd all = half;
   for (int k = 0; k < updates; ++k) all = (k + 1 < updates ? whole : half) * next * all;
-  return {all.topLeftCorner(kSize, kSize), all.block(0, kCommand, kSize, 1)};
-}
-
-/// The base over `dt`, the modal force held: {eta, eta'} <- Phi {eta, eta'} + Gamma Phi^T F.
-struct BaseHold {
-  MatrixXd Phi, Gamma;
-};
-
-BaseHold holdOf(const ModalModel& base, double dt) {
-  const Index k = base.stiffness.size();
-  BaseHold out{MatrixXd::Zero(2 * k, 2 * k), MatrixXd::Zero(2 * k, k)};
-  if (base.damping.isDiagonal(0.0)) {
-    for (Index i = 0; i < k; ++i) {
-      const SecondOrderHold one = discretise(base.stiffness(i), base.damping(i, i), dt);
-      out.Phi(i, i) = one.Phi(0, 0);
-      out.Phi(i, k + i) = one.Phi(0, 1);
-      out.Phi(k + i, i) = one.Phi(1, 0);
-      out.Phi(k + i, k + i) = one.Phi(1, 1);
-      out.Gamma(i, i) = one.Gamma(0);
-      out.Gamma(k + i, i) = one.Gamma(1);
-    }
-    return out;
-  }
-  MatrixXd M = MatrixXd::Zero(3 * k, 3 * k);
-  M.block(0, k, k, k).setIdentity();
-  M.block(k, 0, k, k) = -MatrixXd(base.stiffness.asDiagonal());
-  M.block(k, k, k, k) = -base.damping;
-  M.block(k, 2 * k, k, k).setIdentity();
-  const MatrixXd E = (M * dt).exp();
-  return {E.topLeftCorner(2 * k, 2 * k), E.topRightCorner(2 * k, k)};
+  return {all.topLeftCorner(kSize, kSize), all.block(0, kCommand, kSize, 1), kSensor};
 }
 
 /// The whole loop over a period, of {eta, eta', six channels, six servo models where the inertia is
@@ -189,11 +169,10 @@ MatrixXd systemOf(const Loop& loop) {
   MatrixXd S = MatrixXd::Zero(size, size);
 
   // What the controller is given: of the accelerations, and of its own model of them.
-  constexpr Index kModelSensor = 3;
   MatrixXd sampled = MatrixXd::Zero(6, size), modelled = MatrixXd::Zero(6, size);
   for (Index i = 0; i < 6; ++i) {
-    sampled(i, channels + i * n + Mechanics::kSensor) = 1.0;
-    if (own.inertia) modelled(i, models + i * m + kModelSensor) = 1.0;
+    sampled(i, channels + i * n + channel.sensor) = 1.0;
+    if (own.inertia) modelled(i, models + i * m + model.sensor) = 1.0;
   }
   MatrixXd used = sampled;
   if (d > 0) {
@@ -205,7 +184,7 @@ MatrixXd systemOf(const Loop& loop) {
   MatrixXd F = -spatialMass(loop.robot_P) * used;
 
   // Admittance model.
-  const BaseHold hold = holdOf(loop.base, T);
+  const ModalHold hold = modalHold(loop.base, T);
   MatrixXd before = MatrixXd::Zero(2 * k, size);
   before.leftCols(2 * k).setIdentity();
   if (own.inertia) {
@@ -222,7 +201,7 @@ MatrixXd systemOf(const Loop& loop) {
   // The command, from where the model is at its own time or, ahead, at the legs'.
   MatrixXd told = S.topRows(2 * k);
   if (own.inertia) {
-    const BaseHold ahead = holdOf(loop.base, M_SQRT2 / loop.sensor_cutoff + 0.5 * T);
+    const ModalHold ahead = modalHold(loop.base, wrenchDelay(own.servo, T));
     told = ahead.Phi * S.topRows(2 * k) + ahead.Gamma * u;
   }
   MatrixXd command = Phi * told.topRows(k);
@@ -230,11 +209,11 @@ MatrixXd systemOf(const Loop& loop) {
     const MatrixXd x_dot = Phi * told.bottomRows(k);
     const MatrixXd x_ddot = Phi * (u - loop.base.stiffness.asDiagonal() * told.topRows(k) -
                                    loop.base.damping * told.bottomRows(k));
-    const double update = static_cast<double>(plant::kUpdatePeriod) * kSecondPerNanosecond;
-    const double age = 0.5 * static_cast<double>(plant::kTransducerPeriod) * kSecondPerNanosecond;
-    const double D = own.servo_delay + update - 0.5 * T, A = D - age - 0.5 * update;
-    command += (A + own.derivative + 1.0 / own.velocity_gain) * x_dot +
-               (0.5 * A * A + own.derivative * D + (D + own.tau) / own.velocity_gain) * x_ddot;
+    LegMotion rate, acceleration;
+    rate.L_dot.setOnes();
+    acceleration.L_ddot.setOnes();
+    command += feedForward(own.servo, rate, T, T, 1.0)(0) * x_dot +
+               feedForward(own.servo, acceleration, T, T, 1.0)(0) * x_ddot;
   }
   for (Index i = 0; i < 6; ++i) {
     const Index at = channels + i * n;
@@ -269,23 +248,23 @@ Loop loopOf(const ControllerConfig& controller, const plant::PlantConfig& p, con
   double K = 2.0 * extend * retract / (extend + retract);
   if (direction == Direction::kExtending) K = extend;
   if (direction == Direction::kRetracting) K = retract;
-  constexpr double kFractional = 256.0;  // eight bits of U, (2.7a)
-  const double speed = K * plant::LegSlave::kVoltsPerDigit * plant::LegSlave::kAmperesPerVolt /
-                       kFractional / p.transducer.scale;
-  loop.velocity_gain = p.leg_slave.K_P * speed;
-  loop.derivative_gain = p.leg_slave.K_D * speed;
+  loop.velocity_gain = plant::velocityGain(K, p.leg_slave, p.transducer);
+  loop.derivative_gain = loop.velocity_gain * p.leg_slave.K_D / p.leg_slave.K_P;
   loop.tau = p.actuator.tau;
   loop.filter_cutoff = p.filters == plant::LegFilters::kOutputs ? p.filter_cutoff : 0.0;
   loop.sensor_cutoff = p.sensor.cutoff;
 
-  const Compensation& c = controller.compensation;
-  const ServoModel& servo = controller.servo;
-  const double up = servo.extend.mean(), down = servo.retract.mean();
   Loop::Believed& own = loop.believed;
-  own = {c.feed_forward,   c.inertia,          loop.robot_P,    2.0 * up * down / (up + down),
-         servo.tau.mean(), servo.delay.mean(), servo.derivative};
-  if (direction == Direction::kExtending) own.velocity_gain = up;
-  if (direction == Direction::kRetracting) own.velocity_gain = down;
+  own = {controller.compensation.feed_forward, controller.compensation.inertia, loop.robot_P,
+         controller.servo};
+  const double up = own.servo.extend.mean(), down = own.servo.retract.mean();
+  double believed = 2.0 * up * down / (up + down);
+  if (direction == Direction::kExtending) believed = up;
+  if (direction == Direction::kRetracting) believed = down;
+  own.setGain(believed);
+  own.servo.tau.setConstant(own.servo.tau.mean());
+  own.servo.delay.setConstant(own.servo.delay.mean());
+  own.servo.rail = HUGE_VAL;
   return loop;
 }
 
@@ -328,8 +307,7 @@ Margins margins(const Loop& loop) {
   Margins out;
   const auto bears = [&](double factor) {
     Loop some = loop;
-    some.robot_P.mass *= factor;
-    some.robot_P.I_Bcm_B *= factor;
+    some.robot_P = heavier(factor, some.robot_P);
     return decays(some);
   };
   double lo = 1.0, hi = 1.0;

@@ -330,6 +330,20 @@ std::string Section::text(std::string_view key) {
   return value.text;
 }
 
+std::vector<std::string> Section::texts(std::string_view key) {
+  const Value& value = need(key);
+  if (value.kind != Value::Kind::kList)
+    fail(key, fmt::format("is {}, want a list", kindName(value)));
+  std::vector<std::string> out;
+  for (const Value& child : value.children) {
+    if (child.kind != Value::Kind::kScalar)
+      failAt(child, fmt::format("{}{}", path_.empty() ? "" : path_ + ".", key),
+             fmt::format("holds {}, want texts", kindName(child)));
+    out.push_back(child.text);
+  }
+  return out;
+}
+
 std::string Section::choice(std::string_view key, std::initializer_list<std::string_view> allowed) {
   const Value& value = need(key);
   if (value.kind != Value::Kind::kScalar ||

@@ -8,10 +8,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "ves/analysis/gate.hpp"
 #include "ves/config/base.hpp"
 #include "ves/config/masses.hpp"
 #include "ves/config/servo.hpp"
 #include "ves/config/urdf.hpp"
+#include "ves/plant/nominal_servo.hpp"
 
 namespace ves {
 namespace {
@@ -107,31 +109,18 @@ Legs readLegs(Section s) {
   return legs;
 }
 
-/// What the legs' numbers make of the servos.
-ServoModel nominalServo(const Legs& legs, double sensor_cutoff) {
-  using plant::LegSlave;
-  ServoModel s;
-  constexpr double kFractional = 256.0;  // eight bits of U, (2.7a)
-  const double current =                 // [A] at the D/A converter's full scale
-      LegSlave::kFullScale * LegSlave::kVoltsPerDigit * LegSlave::kAmperesPerVolt;
-  const double digits_per_count = legs.gains.K_P / kFractional;
-  s.rail = LegSlave::kFullScale / digits_per_count * legs.transducer.scale;
-  s.extend.setConstant(legs.actuator.gain_extend * current / s.rail);
-  s.retract.setConstant(legs.actuator.gain_retract * current / s.rail);
-  s.tau.setConstant(legs.actuator.tau);
-  s.update = static_cast<double>(plant::kUpdatePeriod) * kSecondPerNanosecond;
-  constexpr int kSpan = 4;  // [-] updates, of X(k) - X(k-4)
-  s.derivative = kSpan * s.update * legs.gains.K_D / legs.gains.K_P;
-  s.reading_age = 0.5 * static_cast<double>(plant::kTransducerPeriod) * kSecondPerNanosecond;
-  s.sensor_cutoff = sensor_cutoff;
-  s.readings = legs.codec;
-  return s;
+Stability readStability(Section& controller, const char* key) {
+  if (!controller.has(key)) return Stability::kUnknown;
+  const std::string text = controller.choice(
+      key, {kStabilityNames[0], kStabilityNames[1], kStabilityNames[2], kStabilityNames[3]});
+  return static_cast<Stability>(
+      std::find(std::begin(kStabilityNames), std::end(kStabilityNames), text) -
+      std::begin(kStabilityNames));
 }
 
 /// What goes beyond the report; without the key all of it is off.
 Compensation readCompensation(Section& controller) {
   Compensation c;
-  c.ramp = 0.5;
   if (!controller.has("compensation")) return c;
   Section s = controller.section("compensation");
   c.feed_forward = s.flag("feed_forward");
@@ -406,8 +395,7 @@ void readReality(Section s, plant::PlantConfig& p) {
   const double mass = s.has("mass") ? s.number("mass", 0.01, 100.0) : 1.0;
   const double center = s.has("center") ? s.number("center", 0.0, 10.0) : 1.0;
   const auto change = [&](RigidBody& body) {
-    body.mass *= mass;
-    body.I_Bcm_B *= mass;
+    body = heavier(mass, body);
     body.p_BoBcm_B *= center;
   };
   change(p.payload.robot.base);
@@ -450,16 +438,17 @@ Experiment build(const Value& document) {
 
   Section controller = root.section("controller");
   c.period = controller.integer("period_ns", 1'000'000, 1'000'000'000);
-  c.gentle_speed = controller.number("gentle_speed_m_per_s", 1e-3, 1.0);
-  c.gentle_rotation = controller.number("gentle_rotation_deg_per_s", 1e-1, 100.0) * kDegree;
-  const auto braking = [&](const std::string& kind) -> ControllerConfig::Braking {
+  c.gentle.speed = controller.number("gentle_speed_m_per_s", 1e-3, 1.0);
+  c.gentle.rotation = controller.number("gentle_rotation_deg_per_s", 1e-1, 100.0) * kDegree;
+  const auto braking = [&](const std::string& kind) -> Braking {
     return {controller.number(kind + "_braking_m_per_s2", 1e-3, 100.0),
             controller.number(kind + "_rotation_braking_deg_per_s2", 1e-1, 1e4) * kDegree};
   };
-  c.gentle_braking = braking("gentle");
+  c.gentle.braking = braking("gentle");
   c.stop_braking = braking("stop");
   c.arming_samples = static_cast<int>(controller.integer("arming_samples", 1, 10'000));
-  if (controller.has("force")) c.forced = controller.flag("force");
+  c.stability = readStability(controller, "stability");
+  c.stability_uncompensated = readStability(controller, "stability_uncompensated");
   c.tare_ramp = controller.number("tare_ramp_s", 0.01, 100.0);
   c.compensation = readCompensation(controller);
   Section still = controller.section("still");
@@ -481,7 +470,8 @@ Experiment build(const Value& document) {
   const Sensor sensor = readSensor(root.section("sensor"));
   c.sensor = {sensor.model.S_proc().inverse(), sensor.X_PS};
   c.stillness.bias = bias / sensor.model.volts_per_count;
-  c.servo = nominalServo(legs, sensor.model.cutoff);
+  c.servo = plant::nominalServo(legs.gains, legs.actuator, legs.transducer);
+  c.servo.sensor_cutoff = sensor.model.cutoff;
   c.servo.jitter = c.compensation.jitter;
   if (root.has("servo")) c.servo = withRecord(c.servo, readServo(root.section("servo")));
   c.safety = readSafety(root.section("safety"), sensor.model.volts_per_count);
@@ -571,6 +561,23 @@ Experiment loadExperiment(const std::filesystem::path& file,
 
 Experiment parseExperiment(const std::string& resolved, const std::string& name) {
   return build(parseDocument(resolved, name));
+}
+
+std::string applyStabilityCheck(Experiment& e) {
+  const std::string why = applyStabilityCheck(e.controller, e.plant);
+  Value document = parseDocument(e.resolved, e.name);
+  Value& controller = *document.find("controller");
+  const auto put = [&](const char* key, Stability verdict) {
+    Value value;
+    value.kind = Value::Kind::kScalar;
+    value.text = kStabilityNames[static_cast<std::size_t>(verdict)];
+    controller.put(key, value);
+  };
+  put("stability", e.controller.stability);
+  put("stability_uncompensated", e.controller.stability_uncompensated);
+  e.resolved = emit(document);
+  e.hash = fingerprint(e.resolved);
+  return why;
 }
 
 Interaction interactionOf(const Experiment& experiment, std::int64_t& duration) {

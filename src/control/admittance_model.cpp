@@ -10,6 +10,31 @@
 
 namespace ves {
 
+ModalHold modalHold(const ModalModel& model, double dt) {
+  const Eigen::Index k = model.stiffness.size();
+  ModalHold out{Eigen::MatrixXd::Zero(2 * k, 2 * k), Eigen::MatrixXd::Zero(2 * k, k)};
+  if (model.damping.isDiagonal(0.0)) {
+    for (Eigen::Index i = 0; i < k; ++i) {
+      const SecondOrderHold one = discretise(model.stiffness(i), model.damping(i, i), dt);
+      out.Phi(i, i) = one.Phi(0, 0);
+      out.Phi(i, k + i) = one.Phi(0, 1);
+      out.Phi(k + i, i) = one.Phi(1, 0);
+      out.Phi(k + i, k + i) = one.Phi(1, 1);
+      out.Gamma(i, i) = one.Gamma(0);
+      out.Gamma(k + i, i) = one.Gamma(1);
+    }
+    return out;
+  }
+  // exp([A B; 0 0] T) = [Phi Gamma; 0 I] (van Loan).
+  Eigen::MatrixXd M = Eigen::MatrixXd::Zero(3 * k, 3 * k);
+  M.block(0, k, k, k).setIdentity();
+  M.block(k, 0, k, k) = -Eigen::MatrixXd(model.stiffness.asDiagonal());
+  M.block(k, k, k, k) = -model.damping;
+  M.block(k, 2 * k, k, k).setIdentity();
+  const Eigen::MatrixXd E = (M * dt).exp();
+  return {E.topLeftCorner(2 * k, 2 * k), E.topRightCorner(2 * k, k)};
+}
+
 AdmittanceModel::AdmittanceModel(const ModalModel& model, double period, double ahead)
     : Phi_(model.Phi),
       k_(model.stiffness),
@@ -23,12 +48,14 @@ AdmittanceModel::AdmittanceModel(const ModalModel& model, double period, double 
   Phi_pinv_ = model.Phi.completeOrthogonalDecomposition().pseudoInverse();
   if (coupled_) damping_ = model.damping;
   step_ = hold(model, period);
-  ahead_hold_ = hold(model, ahead);
-  back_ = hold(model, 0.0);
-  constexpr double kMostGrowth = 5.0;  // [-] exponent of a damped mode's way back
-  if (coupled_ && model.damping.norm() * ahead < kMostGrowth) back_ = hold(model, -ahead);
-  for (Eigen::Index i = 0; !coupled_ && i < k; ++i)
-    if (c_(i) * ahead < kMostGrowth) back_.modes.col(i) = hold(model, -ahead).modes.col(i);
+  if (ahead > 0.0) {
+    constexpr double kMostGrowth = 5.0;  // [-] exponent of a damped mode's way back
+    ahead_hold_ = hold(model, ahead);
+    const Hold stay = hold(model, 0.0);
+    back_ = coupled_ && !(model.damping.norm() * ahead < kMostGrowth) ? stay : hold(model, -ahead);
+    for (Eigen::Index i = 0; !coupled_ && i < k; ++i)
+      if (!(c_(i) * ahead < kMostGrowth)) back_.modes.col(i) = stay.modes.col(i);
+  }
   const Eigen::MatrixXd Gamma_2 = coupled_
                                       ? Eigen::MatrixXd(step_.Gamma.bottomRows(k))
                                       : Eigen::MatrixXd(step_.modes.row(5).matrix().asDiagonal());
@@ -50,15 +77,9 @@ AdmittanceModel::Hold AdmittanceModel::hold(const ModalModel& model, double dt) 
     }
     return out;
   }
-  // exp([A B; 0 0] T) = [Phi Gamma; 0 I] (van Loan): exact for damping of any form.
-  Eigen::MatrixXd M = Eigen::MatrixXd::Zero(3 * k, 3 * k);
-  M.block(0, k, k, k).setIdentity();
-  M.block(k, 0, k, k) = -Eigen::MatrixXd(model.stiffness.asDiagonal());
-  M.block(k, k, k, k) = -model.damping;
-  M.block(k, 2 * k, k, k).setIdentity();
-  const Eigen::MatrixXd E = (M * dt).exp();
-  out.Phi = E.topLeftCorner(2 * k, 2 * k);
-  out.Gamma = E.topRightCorner(2 * k, k);
+  const ModalHold both = modalHold(model, dt);
+  out.Phi = both.Phi;
+  out.Gamma = both.Gamma;
   return out;
 }
 
@@ -67,14 +88,15 @@ void AdmittanceModel::reset(const Vec6& x, const Mat6& M_1) noexcept {
   now_.eta_dot.setZero();
   offset_ = x;
   offset_.noalias() -= Phi_ * now_.eta;
+  motion_ = {};
+  motion_.x = x;
+  if (!(ahead_ > 0.0)) return;
   // The reaction of M_1 when let go: a = Phi (Phi^T (-M_1 a) - K eta).
   const Mat6 left = Mat6::Identity() + Phi_ * Phi_.transpose() * M_1;
   const Vec6 pull = Phi_ * k_.cwiseProduct(now_.eta);
   const Vec6 a = -left.partialPivLu().solve(pull);
   const Vector<kMaxModes> u = -(Phi_.transpose() * (M_1 * a));
   now_ = advance(back_, now_, u);
-  motion_ = {};
-  motion_.x = x;
 }
 
 void AdmittanceModel::step(const Wrench& F_Po_I, const Mat6& M_1, double share) noexcept {
@@ -94,7 +116,7 @@ void AdmittanceModel::step(const Wrench& F_Po_I, const Mat6& M_1, double share) 
   u.noalias() = Phi_.transpose() * F;
   now_ = advance(step_, before_, u);
   motion_ = at(now_, u);
-  if (!(share > 0.0)) return;
+  if (!(share * ahead_ > 0.0)) return;
   const PathPoint<6> later = at(advance(ahead_hold_, now_, u), u);
   motion_.x += share * (later.x - motion_.x);
   motion_.x_dot += share * (later.x_dot - motion_.x_dot);

@@ -34,9 +34,9 @@ Wrench staticWrench(const Payload& payload, const JointVector& q, const Mat3& R_
   return weight(payload.top_plate_S, R_SP * g_P) + transfer(X_SR, F_Ro_R);
 }
 
-Wrench gravityCompensation(const Payload& payload, const JointVector& q, const Mat3& R_IP,
-                           const Vec3& g_I) noexcept {
-  return rotate(R_IP, transfer(payload.X_PS, staticWrench(payload, q, R_IP, g_I)));
+Wrench gravityCompensation(const Payload& payload, const Mat3& R_IP,
+                           const Wrench& static_S) noexcept {
+  return rotate(R_IP, transfer(payload.X_PS, static_S));
 }
 
 }  // namespace ves

@@ -53,6 +53,7 @@ std::string_view name(Refusal refusal) noexcept {
     case Refusal::kOutside: return "its path fails a safety check";
     case Refusal::kUnstable: return "with this base and robot the loop would diverge";
     case Refusal::kNoCompensation: return "the configuration has no compensation";
+    case Refusal::kUnassessed: return "nobody has checked whether this loop is stable";
     case Refusal::kLoaded: return "the sensor feels too much: calibrate, or take the load away";
     case Refusal::kCount: break;
   }

@@ -55,7 +55,7 @@ std::string scenarioOf(const PosePlan& plan, const Experiment& experiment, const
   std::string program;
   Vec3 rpy = Vec3::Zero();
   for (const PosePlan::Attitude& a : plan.attitudes) {
-    const double turning = kQuinticPeakRate * (a.rpy - rpy).norm() / c.gentle_rotation;
+    const double turning = kQuinticPeakRate * (a.rpy - rpy).norm() / c.gentle.rotation;
     const double time = std::max({1.0, std::ceil(turning * 10.0) / 10.0, timeTo(a.q.front())});
     program += fmt::format(
         "  - move: {{to: {{alpha_deg: {:.4f}, beta_deg: {:.4f}, z_m: {}}}, duration_s: {:.2f}}}\n",

@@ -36,7 +36,6 @@ ServoEstimate fit(const ServoModel& nominal, double period, double phase, const 
   ServoEstimate out;
   out.servo = nominal;
   out.deviation = nominal;
-  std::array<Eigen::Matrix4d, kLegs> information;
   for (int turn = 0; turn <= kTurns; ++turn) {
     const std::vector<Vec6> now = foretold(out.servo, period, phase, record);
     std::array<std::vector<Vec6>, 4> changed;

@@ -9,7 +9,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "ves/config/document.hpp"
+#include "ves/base/errors.hpp"
 
 namespace ves {
 namespace {

@@ -11,6 +11,7 @@
 
 #include "ves/analysis/appendix_e.hpp"
 #include "ves/analysis/loop.hpp"
+#include "ves/base/build.hpp"
 #include "ves/config/base.hpp"
 #include "ves/identification/scenario.hpp"
 #include "ves/report/comparison.hpp"
@@ -62,14 +63,14 @@ class Reproduction {
             "The simulation results of NASA-CR-195076, rebuilt with version {} of this "
             "replica in lockstep. Numbers that the report leaves out are substitutes (up to {} "
             "in a run); where one decides, nothing is claimed.",
-            kVersion, substitutes_));
+            build().version, substitutes_));
     for (const Claim& c : page_.claims())
       out.summary["claims"].push_back({{"where", c.where},
                                        {"claim", c.says},
                                        {"reached", c.reached},
                                        {"verdict", name(c.verdict)},
                                        {"why", c.why}});
-    out.summary["version"] = kVersion;
+    out.summary["version"] = describeBuild();
     for (const auto& [key, value] : numbers_.items()) out.summary[key] = value;
     return out;
   }
@@ -78,11 +79,12 @@ class Reproduction {
   struct Run {
     Series series;
     RunResult result;
-    nlohmann::ordered_json summary;
   };
 
   Experiment load(const std::string& scenario, const Overrides& set = {}) const {
-    return loadExperiment(findScenario(scenario, config_), set);
+    Experiment e = loadExperiment(findScenario(scenario, config_), set);
+    if (wantsAdmittance(e.controller.program)) applyStabilityCheck(e);
+    return e;
   }
 
   Run run(const std::string& scenario, const Overrides& set = {}) {
@@ -98,7 +100,6 @@ class Reproduction {
     }
     out.series = readSeries(log_.string());
     fs::remove(log_);
-    out.summary = summarise(out.series, out.result);
     return out;
   }
 
@@ -170,6 +171,7 @@ class Reproduction {
   void drift() {
     page_.section("4.1.2 Drift over 65 hours");
     const Run r = run("sensor_drift");
+    Numbers summary = summarise(r.series, r.result);
     const std::vector<Look> all = looks(r.series);
     std::vector<Panel> panels = {{"time [h]", "force [N]", {}, false},
                                  {"time [h]", "moment [N m]", {}, false},
@@ -189,17 +191,16 @@ class Reproduction {
     for (const char* key :
          {"looks", "fz_drift_peak_to_peak_n", "fx_drift_peak_to_peak_n", "fz_drift_after_3h_max_n",
           "fz_drift_after_4h_max_n", "fz_drift_temperature_correlation"})
-      numbers_["sensor_drift"][key] = r.summary[key];
+      numbers_["sensor_drift"][key] = summary[key];
     page_.claim(
         {"4.1.2, figures 4.2 and 4.3",
          "a period of 24 h, with the temperature (2.5 C), Z worst; recalibrate every 3 to 4 h",
          fmt::format("{} looks; Z drifts by {:.1f} N, X by {:.1f} N, correlation with the "
                      "temperature {:.3f}; {:.1f} N of it comes back 4 h after a calibration",
-                     r.summary["looks"].get<int>(),
-                     r.summary["fz_drift_peak_to_peak_n"].get<double>(),
-                     r.summary["fx_drift_peak_to_peak_n"].get<double>(),
-                     std::abs(r.summary["fz_drift_temperature_correlation"].get<double>()),
-                     r.summary["fz_drift_after_4h_max_n"].get<double>()),
+                     summary["looks"].get<int>(), summary["fz_drift_peak_to_peak_n"].get<double>(),
+                     summary["fx_drift_peak_to_peak_n"].get<double>(),
+                     std::abs(summary["fz_drift_temperature_correlation"].get<double>()),
+                     summary["fz_drift_after_4h_max_n"].get<double>()),
          Verdict::kCannotTell, "the drift per degree is a substitute"});
     page_.figure(
         "Figures 4.2 and 4.3: mean of each look at the unloaded sensor, and the laboratory.",
@@ -335,8 +336,9 @@ class Reproduction {
   void trajectories() {
     page_.section("4.2.1 Trajectory control");
     const Run z = run("z_sine");
-    const double extending = z.summary["z_error_max_extending_m"].get<double>();
-    const double retracting = z.summary["z_error_max_retracting_m"].get<double>();
+    Numbers of_z = summarise(z.series, z.result);
+    const double extending = of_z["z_error_max_extending_m"].get<double>();
+    const double retracting = of_z["z_error_max_retracting_m"].get<double>();
     numbers_["z_sine"]["z_error_max_extending_m"] = extending;
     numbers_["z_sine"]["z_error_max_retracting_m"] = retracting;
     const bool near =
@@ -361,7 +363,7 @@ class Reproduction {
     page_.figure("Figures 4.4 and 4.5: z, and commanded minus actual.", panels);
 
     const Run alpha = run("alpha_sine");
-    const double most = alpha.summary["alpha_error_max_rad"].get<double>();
+    const double most = summarise(alpha.series, alpha.result)["alpha_error_max_rad"].get<double>();
     numbers_["alpha_sine"]["alpha_error_max_rad"] = most;
     page_.claim({"4.2.1, figures 4.6 and 4.7",
                  "alpha +-20 deg at 0.5 Hz: the simulation's error is slightly larger than the "
@@ -380,10 +382,11 @@ class Reproduction {
   void freeDecay() {
     page_.section("4.2.2 Free decay of Table 4.1");
     const Run r = run("free_decay");
+    Numbers summary = summarise(r.series, r.result);
     std::string largest;
     for (int i = 0; i < 6; ++i) {
       const std::string key = fmt::format("{}_error_max_{}", kCoordinate[i], i < 3 ? "m" : "rad");
-      const double e = r.summary[key].get<double>();
+      const double e = summary[key].get<double>();
       numbers_["free_decay"][key] = e;
       largest +=
           fmt::format("{}{} {:.1f} {}", i ? ", " : "", kCoordinate[i], e * shown(i), unit(i));
@@ -499,7 +502,7 @@ class Reproduction {
               const Distance d = distance(ves, srms),
                              of_platform = distance(actual(r.series), srms);
               Numbers& out = n["ves"][filters + "_" + place + "_" + noise];
-              out["ended"] = r.summary["ended"];
+              out["ended"] = name(r.result.phase);
               out["position_error_rms_m"] = d.rms_position;
               out["position_error_max_m"] = d.peak_position;
               out["attitude_error_rms_rad"] = d.rms_attitude;
@@ -646,7 +649,8 @@ class Reproduction {
   /// More modes than the loop holds: the run must end itself.
   void divergence() {
     const std::string scenario = "srms_deploy_doss";
-    const Overrides set = {"base.keep_modes=6", "legs.filters=outputs"};
+    const Overrides set = {"base.keep_modes=6", "legs.filters=outputs",
+                           "controller.stability=forced"};
     const Experiment e = load(scenario, set);
     const Slowest s =
         slowest(loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kExtending));
@@ -658,7 +662,7 @@ class Reproduction {
         {"growth_per_s", s.growth},
         {"frequency_hz", s.frequency},
         {"stopped_by", name(r.result.cause)},
-        {"ended", r.summary["ended"]}};
+        {"ended", name(r.result.phase)}};
     page_.text(
         fmt::format("With six modes kept the deploy configuration with the DOSS diverges, as the "
                     "model of the loop "
@@ -862,16 +866,13 @@ class Reproduction {
     return most;
   }
 
-  /// A run's rms distance from the moving base, by the base's largest motion.
-  static double share(const Run& r) {
-    return r.summary.contains("emulation_error_rms_m")
-               ? r.summary["emulation_error_rms_m"].get<double>() /
-                     r.summary["emulation_travel_m"].get<double>()
-               : NAN;
+  /// Rms distance of the platform from the moving base, by the base's largest motion.
+  static double share(const std::optional<Emulation>& e) {
+    return e ? distance(e->platform, e->base).rms_position / travel(e->base).peak_position : NAN;
   }
   static std::string percent(double x) { return fmt::format("{:.2f}", 100.0 * x); }
-  static std::string ended(const Run& r) {
-    return r.result.good() ? percent(share(r)) : std::string(name(r.result.phase));
+  static std::string ended(const Run& r, double share) {
+    return r.result.good() ? percent(share) : std::string(name(r.result.phase));
   }
 
   void beyond() {
@@ -921,7 +922,8 @@ class Reproduction {
 
   /// The eight runs of 4.3 beside the robot on its base in free space.
   void onTheArm(Numbers& n) {
-    const Overrides quiet = {"sensor.noise=false"}, six = {"base.keep_modes=6"};
+    const Overrides quiet = {"sensor.noise=false"},
+                    six = {"base.keep_modes=6", "controller.stability=forced"};
     const auto with = [](Overrides a, const Overrides& b) {
       a.insert(a.end(), b.begin(), b.end());
       return a;
@@ -936,14 +938,17 @@ class Reproduction {
         std::vector<std::string> row = {title(configuration, robot)};
         const auto add = [&](const char* key, const Overrides& set) {
           const Run r = run(scenario, set);
-          if (r.result.good()) own[key] = share(r);
-          row.push_back(ended(r));
-          return r;
+          const std::optional<Emulation> e = emulation(r.series);
+          if (r.result.good()) own[key] = share(e);
+          row.push_back(ended(r, share(e)));
+          return e;
         };
         for (const Stage& stage : stages()) {
-          const Run r = add(stage.name, stage.set);
-          if (row.size() == 2) row.insert(row.begin() + 1, mm(r.summary["emulation_travel_m"]));
-          if (scenario == "srms_deploy_doss") distanceOverTime(r, stage.name, distances);
+          const std::optional<Emulation> e = add(stage.name, stage.set);
+          if (!e) continue;
+          if (row.size() == 2) row.insert(row.begin() + 1, mm(travel(e->base).peak_position));
+          if (scenario == "srms_deploy_doss")
+            distances.lines.push_back(distanceOverTime(*e, stage.name, distances.lines.size()));
         }
         add("all, no noise", with(all, quiet));
         add("six modes, as published, no noise",
@@ -969,27 +974,21 @@ class Reproduction {
     page_.table({"", "[Hz]", "zeta", "added, all", "[Hz]", "zeta", "added, all"}, damping);
   }
 
-  /// Of the platform from the moving base, as a line.
-  void distanceOverTime(const Run& r, const char* name, Panel& panel) {
-    Interaction interaction;
-    const Motion base =
-        motion(simulated(r.series.experiment, InteractionModel::kWhole, interaction));
-    const Motion platform = actual(r.series);
-    Line out{name, {}, {}, static_cast<int>(panel.lines.size()), false};
-    for (std::size_t i = 0; i < std::min(base.x.size(), platform.x.size()); ++i) {
-      out.x.push_back(platform.t[i]);
-      out.y.push_back(kMilli * (platform.x[i] - base.x[i]).head<3>().norm());
+  /// Of the platform from the moving base.
+  static Line distanceOverTime(const Emulation& e, const char* name, std::size_t colour) {
+    Line out{name, {}, {}, static_cast<int>(colour), false};
+    for (std::size_t i = 0; i < std::min(e.base.x.size(), e.platform.x.size()); ++i) {
+      out.x.push_back(e.platform.t[i]);
+      out.y.push_back(kMilli * (e.platform.x[i] - e.base.x[i]).head<3>().norm());
     }
-    panel.lines.push_back(out);
+    return out;
   }
 
   /// Of the two lowest modes of base and robot, let go from a centimetre and a half.
   void addedDamping(const std::string& scenario, const std::string& what, Overrides set,
                     Numbers& numbers, std::vector<std::vector<std::string>>& table) {
-    Interaction kept;
     std::int64_t duration = 0;
-    kept = interactionOf(load(scenario), duration);
-    const std::vector<CoupledMode> modes = coupledModes(kept);
+    const std::vector<CoupledMode> modes = coupledModes(interactionOf(load(scenario), duration));
     std::vector<std::string> row = {what};
     set.push_back("gravity_m_per_s2=0");
     for (std::size_t j = 0; j < 2; ++j) {
@@ -1026,8 +1025,9 @@ class Reproduction {
       set.push_back("gravity_m_per_s2=0");
       set.insert(set.end(), more.begin(), more.end());
       const Run r = run("srms_capture_doss", set);
-      n["budget"][what] = share(r);
-      rows.push_back({what, ended(r)});
+      const double reached = share(emulation(r.series));
+      n["budget"][what] = reached;
+      rows.push_back({what, ended(r, reached)});
     };
     const char* quiet = "sensor.noise=false";
     add("noise and counts, as it is", {});

@@ -4,6 +4,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "ves/srms/modes.hpp"
 
@@ -53,6 +54,32 @@ Motion actual(const Series& series) {
     out.t.push_back(t);
     out.x.push_back(Vec6::Map(row.truth.x));
   });
+  return out;
+}
+
+std::optional<Emulation> emulation(const Series& series) {
+  constexpr Eigen::Index kMostModes = 12;
+  const Experiment& e = series.experiment;
+  if (!wantsAdmittance(e.controller.program) ||
+      e.controller.admittance.stiffness.size() > kMostModes)
+    return {};
+  Emulation out;
+  out.platform = actual(series);
+  if (out.platform.x.size() < 2) return {};
+  InteractionOptions options;
+  options.model = InteractionModel::kWhole;
+  options.step = e.controller.period;
+  const Interaction interaction = interactionOf(e, options.duration);
+  const Vec6 start = commanded(series).x.front();
+  options.eta = interaction.base.Phi.completeOrthogonalDecomposition().solve(start);
+  options.eta_dot = Eigen::VectorXd::Zero(options.eta.size());
+  const Vec6 rest = start - interaction.base.Phi * options.eta;
+  for (Vec6& x : out.platform.x) x -= rest;
+  try {
+    out.base = motion(simulate(interaction, options));
+  } catch (const std::domain_error&) {
+    return {};
+  }
   return out;
 }
 

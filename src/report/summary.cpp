@@ -3,15 +3,14 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <fstream>
-#include <stdexcept>
 #include <utility>
 
 #include "ves/report/comparison.hpp"
 #include "ves/report/looks.hpp"
+#include "ves/run/doctor.hpp"
 
 namespace ves {
 namespace {
@@ -152,35 +151,11 @@ void addDrift(const Series& series, nlohmann::ordered_json& out) {
   }
 }
 
-/// The platform's motion in the first admittance segment beside that of the robot on its base in
-/// free space (SRMS-robot, chapter 3, nothing left out): what the emulation is for.
+/// How far the platform was from the robot on its base in free space.
 void addEmulation(const Series& series, nlohmann::ordered_json& out) {
-  constexpr Eigen::Index kMostModes = 12;  // more would take longer than the run
-  const Experiment& e = series.experiment;
-  if (!wantsAdmittance(e.controller.program) ||
-      e.controller.admittance.stiffness.size() > kMostModes)
-    return;
-  Motion platform = actual(series);
-  if (platform.x.size() < 2) return;
-  std::int64_t duration = 0;
-  const Interaction interaction = interactionOf(e, duration);
-  InteractionOptions options;
-  options.model = InteractionModel::kWhole;
-  options.step = e.controller.period;
-  options.duration = duration;
-  // From where it was let go; what the modes do not express of that stays.
-  const Vec6 start = commanded(series).x.front();
-  options.eta = interaction.base.Phi.completeOrthogonalDecomposition().solve(start);
-  options.eta_dot = Eigen::VectorXd::Zero(options.eta.size());
-  const Vec6 rest = start - interaction.base.Phi * options.eta;
-  for (Vec6& x : platform.x) x -= rest;
-  Motion base;
-  try {
-    base = motion(simulate(interaction, options));
-  } catch (const std::domain_error&) {
-    return;  // it grows without bound
-  }
-  const Distance error = distance(platform, base), moved = travel(base);
+  const std::optional<Emulation> e = emulation(series);
+  if (!e) return;
+  const Distance error = distance(e->platform, e->base), moved = travel(e->base);
   out["emulation_travel_m"] = moved.peak_position;
   out["emulation_error_rms_m"] = error.rms_position;
   out["emulation_error_max_m"] = error.peak_position;
@@ -196,17 +171,14 @@ void addTiming(const Series& series, nlohmann::ordered_json& out) {
     if (row.has_timing) last = &row.timing;
   if (!last) return;
   const auto write = [&](const std::string& name, std::int64_t timing_t::*value) {
-    std::vector<std::int64_t> all;
+    std::vector<double> all;
     for (const Row& row : series.rows)
-      if (row.has_timing) all.push_back(row.timing.*value);
-    std::sort(all.begin(), all.end());
-    const auto at = [&](double share) {
-      const auto i = static_cast<std::size_t>(share * static_cast<double>(all.size() - 1));
-      return static_cast<double>(all[i]) * kSecondPerNanosecond;
-    };
-    out[name + "_median_s"] = at(0.5);
-    out[name + "_p99_s"] = at(0.99);
-    out[name + "_max_s"] = at(1.0);
+      if (row.has_timing)
+        all.push_back(static_cast<double>(row.timing.*value) * kSecondPerNanosecond);
+    const Latency latency = latencyOf(all);
+    out[name + "_median_s"] = latency.median;
+    out[name + "_p99_s"] = latency.p99;
+    out[name + "_max_s"] = latency.max;
   };
   write("wake_up_late", &timing_t::late_ns);
   write("tick_compute", &timing_t::compute_ns);

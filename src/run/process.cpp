@@ -11,7 +11,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "ves/config/document.hpp"
+#include "ves/base/errors.hpp"
 
 namespace ves {
 

@@ -19,25 +19,14 @@ constexpr std::int64_t kLongestLeap = 100'000'000;  // [-] ticks that a command 
 constexpr int kAnswerTries = 50;                    // [-] before the other side counts as gone
 constexpr std::int64_t kFirstSampleTime = 10'000'000'000;  // [ns]
 
-/// What a running loop tells of its time.
-struct TickTimes {
-  timing_t timing{};
-
-  /// Counts the times of this tick into the histograms.
-  void count() noexcept {
-    const auto into = [](LatencyHistogram& histogram, std::int64_t ns, std::int32_t* bins) {
-      histogram.add(ns);
-      std::copy(histogram.bins().begin(), histogram.bins().end(), bins);
-    };
-    into(late, timing.late_ns, timing.late);
-    into(compute, timing.compute_ns, timing.compute);
-    into(sample_age, timing.sample_age_ns, timing.sample_age);
-    into(sample_to_command, timing.sample_to_command_ns, timing.sample_to_command);
-  }
-
- private:
-  LatencyHistogram late, compute, sample_age, sample_to_command;
-};
+/// Counts the times of this tick into the histograms.
+void count(timing_t& t) noexcept {
+  static_assert(std::extent_v<decltype(t.late)> == kLatencyBins);
+  ++t.late[latencyBin(t.late_ns)];
+  ++t.compute[latencyBin(t.compute_ns)];
+  ++t.sample_age[latencyBin(t.sample_age_ns)];
+  ++t.sample_to_command[latencyBin(t.sample_to_command_ns)];
+}
 
 void conduct(const char* who, int priority, bool required) {
   if (!claimRealtime(priority, required))
@@ -133,7 +122,7 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
     bus.wait(100);
   }
   Ticker ticker(experiment.controller.period);
-  TickTimes times;
+  timing_t timing{};
   std::int64_t woke = monotonicNow();
   for (;; ++in.tick) {
     in.ran_long = monotonicNow() - woke > experiment.controller.period;
@@ -156,7 +145,6 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
     bus.publish(channel::kState, told);
     flight.keep(told, toMessage(in.sample, {}, -1));
     const std::int64_t over = monotonicNow();
-    timing_t& timing = times.timing;
     timing.header = h;
     timing.late_ns = ticker.late();
     timing.receive_ns = received - woke;
@@ -168,7 +156,7 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
     timing.sample_to_command_ns = sent - sample_time;
     timing.missed = ticker.missed();
     (in.ran_long ? timing.missed_ran_long : timing.missed_woke_late) += missed;
-    times.count();
+    count(timing);
     bus.publish(channel::kTiming, timing);
     if (finish(state)) break;
   }

@@ -21,7 +21,6 @@
 #include <map>
 #include <memory>
 
-#include "ves/analysis/gate.hpp"
 #include "ves/realtime/realtime.hpp"
 #include "ves/report/summary.hpp"
 
@@ -126,9 +125,10 @@ std::string rowOf(const SweepPlan& plan, const SweepOptions& options, std::int64
   const std::string rest = std::string(std::size(kNumbers), ',');
   try {
     Experiment e = loadExperiment(options.scenario, all);
-    const std::string barred = admit(e.controller, e.plant);
-    if (!e.controller.admissible && wantsAdmittance(e.controller.program))
-      return row + ",refused," + cell(barred) + "," + rest;
+    const std::string diverges =
+        wantsAdmittance(e.controller.program) ? applyStabilityCheck(e) : std::string();
+    if (e.controller.stability == Stability::kUnstable)
+      return row + ",refused," + cell(diverges) + "," + rest;
     RunResult result;
     {
       LogWriter writer(log);

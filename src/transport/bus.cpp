@@ -9,7 +9,7 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "ves/config/document.hpp"
+#include "ves/base/errors.hpp"
 #include "ves/transport/channels.hpp"
 
 namespace ves {

@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <lcm/lcm-cpp.hpp>
 
-#include "ves/config/document.hpp"
+#include "ves/base/errors.hpp"
 
 namespace ves {
 namespace {

@@ -8,6 +8,8 @@
 #include <cmath>
 #include <random>
 
+#include "ves/simulation/lockstep.hpp"
+
 namespace ves {
 namespace {
 
@@ -22,12 +24,11 @@ bool inRange(T x, T lo, T hi) {
   return x >= lo && x <= hi;
 }
 
-constexpr double kMaxJointValue = 1e3;                  // [rad | m]
-constexpr double kColdest = -273.15, kHottest = 200.0;  // [C]
-constexpr double kMaxTime = 1e6;                        // [s] of an order
-constexpr double kMaxTranslation = 10.0;                // [m]
-constexpr double kMaxRotation = 10.0;                   // [rad]
-constexpr double kMaxFrequency = 1e3;                   // [Hz]
+constexpr double kMaxJointValue = 1e3;    // [rad | m]
+constexpr double kMaxTime = 1e6;          // [s] of an order
+constexpr double kMaxTranslation = 10.0;  // [m]
+constexpr double kMaxRotation = 10.0;     // [rad]
+constexpr double kMaxFrequency = 1e3;     // [Hz]
 
 }  // namespace
 
@@ -206,23 +207,12 @@ std::optional<Sample> fromMessage(const sample_t& m) noexcept {
   Sample s;
   s.sequence = m.header.sequence;
   s.time = m.header.time_ns;
-  bool good = inRange<std::int64_t>(s.sequence, 0, kMaxSequence);
-  for (std::size_t i = 0; i < s.adc.size(); ++i) {
-    s.adc[i] = m.adc[i];
-    good = good && inRange(m.adc[i], -32768, 32767);
-  }
-  for (std::size_t i = 0; i < s.legs.size(); ++i) {
-    s.legs[i] = m.legs[i];
-    good = good && inRange(m.legs[i], 0, plant::Temposonics::kMaxCount);
-  }
-  for (int i = 0; i < kMaxJoints; ++i) {
-    s.q(i) = m.q[i];
-    good = good && inRange(m.q[i], -kMaxJointValue, kMaxJointValue);
-  }
+  std::copy(std::begin(m.adc), std::end(m.adc), s.adc.begin());
+  std::copy(std::begin(m.legs), std::end(m.legs), s.legs.begin());
+  s.q = JointVector::Map(m.q);
   s.switches = static_cast<std::uint32_t>(m.switches) & kAllSwitchesClosed;
   s.temperature = m.temperature;
-  good = good && inRange(m.temperature, kColdest, kHottest);
-  if (!good) return {};
+  if (!plausible(s)) return {};
   return s;
 }
 

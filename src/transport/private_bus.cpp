@@ -13,7 +13,7 @@
 #include <cstring>
 #include <fstream>
 
-#include "ves/config/document.hpp"
+#include "ves/base/errors.hpp"
 #include "ves/transport/bus.hpp"
 
 namespace ves {

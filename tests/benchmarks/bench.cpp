@@ -12,7 +12,9 @@
 #include <kdl/chainidsolver_recursive_newton_euler.hpp>
 
 #include "support/poses.hpp"
+#include "support/rig.hpp"
 #include "support/robots.hpp"
+#include "ves/control/gravity_compensation.hpp"
 #include "ves/realtime/realtime.hpp"
 #include "ves/replay/replay.hpp"
 #include "ves/run/run.hpp"
@@ -20,9 +22,7 @@
 namespace ves {
 namespace {
 
-Experiment experiment(const std::string& name) {
-  return loadExperiment(test::configDir() + "/scenarios/" + name + ".yaml");
-}
+using test::experiment;
 
 // Kinematics
 
@@ -123,8 +123,9 @@ void GravityCompensationPuma(benchmark::State& state) {
   Mat3 R = rotation({0.1, 0.2, 0.3});
   for (auto _ : state) {
     benchmark::DoNotOptimize(R);
-    benchmark::DoNotOptimize(
-        gravityCompensation(e.controller.payload, e.plant.initial_joints, R, e.controller.gravity));
+    benchmark::DoNotOptimize(gravityCompensation(
+        e.controller.payload, R,
+        staticWrench(e.controller.payload, e.plant.initial_joints, R, e.controller.gravity)));
   }
 }
 BENCHMARK(GravityCompensationPuma);
@@ -181,7 +182,7 @@ struct UnderWay {
   TickInput in;
 
   explicit UnderWay(const std::vector<std::string>& set = {})  // PUMA, six modes
-      : e(loadExperiment(test::configDir() + "/scenarios/puma_on_table_4_1.yaml", set)) {
+      : e(experiment("puma_on_table_4_1", set)) {
     in.order.request = Request::kStart;
     while (in.tick < 700) step();
   }
@@ -259,6 +260,12 @@ void PlantPeriod(benchmark::State& state) {  // 10 ms of the machine with a PUMA
 }
 BENCHMARK(PlantPeriod);
 
+void rates(benchmark::State& state, double simulated, std::int64_t ticks) {
+  state.counters["x_real_time"] = benchmark::Counter(simulated, benchmark::Counter::kIsRate);
+  state.counters["ticks_per_s"] =
+      benchmark::Counter(static_cast<double>(ticks), benchmark::Counter::kIsRate);
+}
+
 void LockstepDemo(benchmark::State& state) {
   const Experiment e = experiment("puma_on_table_4_1");
   double simulated = 0.0;
@@ -268,9 +275,7 @@ void LockstepDemo(benchmark::State& state) {
     simulated += result.simulated;
     ticks += result.ticks;
   }
-  state.counters["x_real_time"] = benchmark::Counter(simulated, benchmark::Counter::kIsRate);
-  state.counters["ticks_per_s"] =
-      benchmark::Counter(static_cast<double>(ticks), benchmark::Counter::kIsRate);
+  rates(state, simulated, ticks);
 }
 BENCHMARK(LockstepDemo)->Unit(benchmark::kMillisecond);
 
@@ -298,9 +303,7 @@ void LockstepDemoOverTheBus(benchmark::State& state) {
   }
   kill(plant, SIGTERM);
   waitpid(plant, nullptr, 0);
-  state.counters["x_real_time"] = benchmark::Counter(simulated, benchmark::Counter::kIsRate);
-  state.counters["ticks_per_s"] =
-      benchmark::Counter(static_cast<double>(ticks), benchmark::Counter::kIsRate);
+  rates(state, simulated, ticks);
 }
 BENCHMARK(LockstepDemoOverTheBus)->UseRealTime()->Iterations(1)->Unit(benchmark::kMillisecond);
 

@@ -12,7 +12,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "ves/config/document.hpp"
+#include "ves/base/errors.hpp"
 #include "ves/transport/bus.hpp"
 
 namespace {
@@ -141,8 +141,6 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   cli.add_option("--json", json, "write the results there too");
   cli.add_option("--beside", beside, "JSON of another run, as a column")->check(CLI::ExistingFile);
-  bool native = false;  // ./ves does it
-  cli.add_flag("--native", native, "a column for this machine's own instructions (a second build)");
   try {
     cli.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

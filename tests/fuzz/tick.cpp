@@ -34,7 +34,8 @@ Segment segment(fuzz::Bytes& in) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const Experiment e =
-      loadExperiment(VES_TEST_CONFIG_DIR "/scenarios/puma_on_table_4_1.yaml");
+      loadExperiment(VES_TEST_CONFIG_DIR "/scenarios/puma_on_table_4_1.yaml",
+                     {"controller.stability=forced", "controller.stability_uncompensated=forced"});
   static const double count = e.plant.transducer.scale;
   const SafetyLimits& limits = e.controller.safety;
   fuzz::Bytes in(data, size);

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "bytes.hpp"
-#include "ves/config/document.hpp"
+#include "ves/base/errors.hpp"
 #include "ves/config/urdf.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

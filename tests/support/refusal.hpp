@@ -4,7 +4,7 @@
 #include <functional>
 #include <string>
 
-#include "ves/config/document.hpp"
+#include "ves/base/errors.hpp"
 
 namespace ves::test {
 

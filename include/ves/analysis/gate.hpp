@@ -29,15 +29,14 @@ struct LoopVerdict {
 std::vector<JointVector> programPoses(const Program& program, const plant::PlantConfig& plant);
 
 /// Without `cures`: only whether it is stable.
-LoopVerdict judge(const ControllerConfig& controller, const plant::PlantConfig& plant,
-                  bool cures = true);
+LoopVerdict assessStability(const ControllerConfig& controller, const plant::PlantConfig& plant,
+                            bool cures = true);
 
 /// In one line: what grows, how fast, and what would cure it.
 std::string explain(const LoopVerdict& verdict);
 
-/// Judges, and bars admittance control (ControllerConfig::admissible) when it would diverge, with the
-/// compensation or out of it, unless
-/// it is forced. The explanation then; empty when all is well.
-std::string admit(ControllerConfig& controller, const plant::PlantConfig& plant);
+/// Sets ControllerConfig::stability and stability_uncompensated; what is forced stays so. Returns
+/// the explanation where the loop would diverge; empty when all is well.
+std::string applyStabilityCheck(ControllerConfig& controller, const plant::PlantConfig& plant);
 
 }  // namespace ves

@@ -40,10 +40,13 @@ struct Loop {
   struct Believed {
     bool feed_forward = false, inertia = false;
     RigidBody robot_P;
-    double velocity_gain = 0.0;  // [1/s]
-    double tau = 0.0;            // [s]
-    double servo_delay = 0.0;    // [s] from a tick to the LegSlave
-    double derivative = 0.0;     // [s]
+    ServoModel servo;  // all legs alike, one gain for both directions, no rail
+
+    double gain() const { return servo.extend(0); }  // [1/s]
+    void setGain(double gain) {
+      servo.extend.setConstant(gain);
+      servo.retract.setConstant(gain);
+    }
   } believed;
 };
 

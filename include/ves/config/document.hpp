@@ -16,18 +16,13 @@
 #include <initializer_list>
 #include <memory>
 #include <set>
-#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
 
-namespace ves {
+#include "ves/base/errors.hpp"
 
-/// Bad input. The message is the whole line that a person sees; the programs end with status 2.
-class InputError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
+namespace ves {
 
 /// One value of a document.
 struct Value {
@@ -81,6 +76,8 @@ class Section {
   std::int64_t integer(std::string_view key, std::int64_t lo, std::int64_t hi);
   bool flag(std::string_view key);
   std::string text(std::string_view key);
+  /// A list of texts, which may be empty.
+  std::vector<std::string> texts(std::string_view key);
   std::string choice(std::string_view key, std::initializer_list<std::string_view> allowed);
   /// `size` numbers; any number of them (at least one) when size is -1.
   Eigen::VectorXd vector(std::string_view key, int size, double lo, double hi);

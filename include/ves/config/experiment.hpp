@@ -42,6 +42,11 @@ Experiment loadExperiment(const std::filesystem::path& file,
 /// Reads back what Experiment::resolved holds; `name` stands for a file name in messages.
 Experiment parseExperiment(const std::string& resolved, const std::string& name);
 
+/// Looks whether the experiment's admittance control decays, and writes the verdict into its
+/// controller and its resolved text. Without it admittance control is refused. Returns the
+/// explanation where the loop would diverge; empty when all is well.
+std::string applyStabilityCheck(Experiment& experiment);
+
 /// Robot and base of the program's first admittance segment, from its start, for the simulation of
 /// chapter 3; `duration` [ns] of the segment. Throws InputError when there is none.
 Interaction interactionOf(const Experiment& experiment, std::int64_t& duration);

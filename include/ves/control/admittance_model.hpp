@@ -20,6 +20,15 @@ struct ModalModel {
   Eigen::MatrixXd damping;    // k x k, [1/s] diagonal (2 zeta omega) when it is proportional
 };
 
+/// Exact over a length of time under a held modal force u: {eta, eta'} <- Phi {eta, eta'} + Gamma
+/// u.
+struct ModalHold {
+  Eigen::MatrixXd Phi, Gamma;  // 2k x 2k, 2k x k
+};
+
+/// Over dt [s], for damping of any form.
+ModalHold modalHold(const ModalModel& model, double dt);
+
 /// Steps a modal model by the exact zero-order hold. Coordinates are those of Pose about home,
 /// taken as small: the wrench's moments drive the fixed angles directly, as in (C.2).
 class AdmittanceModel {

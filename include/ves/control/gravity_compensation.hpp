@@ -14,8 +14,9 @@ namespace ves {
 Wrench staticWrench(const Payload& payload, const JointVector& q, const Mat3& R_IP,
                     const Vec3& g_I) noexcept;
 
-/// The same about Po in inertial axes: what gravity compensation subtracts from the measurement.
-Wrench gravityCompensation(const Payload& payload, const JointVector& q, const Mat3& R_IP,
-                           const Vec3& g_I) noexcept;
+/// A static wrench about Po in inertial axes: what gravity compensation subtracts from the
+/// measurement.
+Wrench gravityCompensation(const Payload& payload, const Mat3& R_IP,
+                           const Wrench& static_S) noexcept;
 
 }  // namespace ves

@@ -73,6 +73,7 @@ enum class Refusal : std::int32_t {
   kLoaded,          // the sensor feels more than admittance control should begin with
   kUnstable,        // admittance control with this base and robot would diverge
   kNoCompensation,  // the configuration has none
+  kUnassessed,      // nobody has looked whether this loop decays
   kCount
 };
 

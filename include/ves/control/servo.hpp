@@ -32,6 +32,12 @@ struct ServoModel {
   double jitter = 0.0;          // [s] by which the time of a reading may be wrong
 };
 
+/// [s] by which a wrench is late where the admittance model uses it: the sensor's filter, and half
+/// of the period for which it is held.
+inline double wrenchDelay(const ServoModel& servo, double period) noexcept {
+  return M_SQRT2 / servo.sensor_cutoff + 0.5 * period;
+}
+
 /// Reference that takes each leg where `legs` says: the inverse of the closed servo, which is of
 /// type one. `lead` [s] is how much after this tick `legs` is meant.
 ///

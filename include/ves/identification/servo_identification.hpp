@@ -22,9 +22,8 @@ struct ServoEstimate {
 };
 
 /// Least squares on the lengths that the servo model of `nominal`, let run by itself, foretells:
-/// Gauss-Newton, each leg for itself, over the phases that the LegSlaves may have had, whose spread is
-/// in the deviations. Throws std::domain_error where a leg moves too little to
-/// tell.
+/// Gauss-Newton, each leg for itself, over the phases that the LegSlaves may have had, whose spread
+/// is in the deviations. Throws std::domain_error where a leg moves too little to tell.
 ServoEstimate identifyServo(const ServoModel& nominal, double period, const LegRecord& record);
 
 }  // namespace ves

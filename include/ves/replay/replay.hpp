@@ -30,7 +30,7 @@ struct ReplayResult {
   Phase phase = Phase::kDisarmed;       // at the end, replayed
   Check cause = Check::kCount;
   std::int64_t cause_tick = -1;
-  std::string barred;  // why the gate bars admittance control; empty: it does not
+  Stability stability = Stability::kUnknown;  // of the replayed configuration
 };
 
 struct ReplayOptions {

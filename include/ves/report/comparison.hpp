@@ -3,6 +3,7 @@
 // The platform's motion in an admittance segment beside SRMS-robot's (section 4.3).
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "ves/report/series.hpp"
@@ -35,6 +36,17 @@ Distance distance(const Motion& a, const Motion& b);
 
 /// Of a motion from where it began.
 Distance travel(const Motion& motion);
+
+/// What an emulation did, and what it is for.
+struct Emulation {
+  Motion platform;  // in the first admittance segment
+  Motion base;      // the robot on its base in free space (SRMS-robot, nothing left out)
+};
+
+/// From where the platform was let go; what the modes do not express of that is left out. None
+/// without admittance control, where so many modes are kept that it would take longer than the run,
+/// and where the base's motion grows without bound.
+std::optional<Emulation> emulation(const Series& series);
 
 /// A mode of base and robot together, the robot's joints locked.
 struct CoupledMode {

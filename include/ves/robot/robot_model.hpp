@@ -23,6 +23,11 @@ struct RigidBody {
 /// One body of both, expressed in A; B's frame is posed in A.
 RigidBody combine(const RigidBody& a_A, const Transform& X_AB, const RigidBody& b_B) noexcept;
 
+/// The same body of so many times the density.
+inline RigidBody heavier(double times, const RigidBody& body) noexcept {
+  return {times * body.mass, body.p_BoBcm_B, times * body.I_Bcm_B};
+}
+
 /// A joint and the link it moves. The link's frame is the joint's frame after the joint's motion.
 struct Link {
   JointType type = JointType::kRevolute;

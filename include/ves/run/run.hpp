@@ -31,8 +31,6 @@ struct RunResult {
 /// Called after every tick; may give an order. An order for a segment needs no id here.
 using Watch = std::function<Order(const TickState&)>;
 
-inline constexpr const char* kVersion = "0.1.0";
-
 experiment_t describe(const Experiment& experiment, const Identity& from, std::int64_t time);
 
 /// The experiment in one process without a bus, as fast as it goes; bit-identical for one seed.

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Everything that testPlatform is told before it runs: geometry, payload, sensor, base, limits,
+// program. A plain struct; config/experiment.hpp reads it from YAML.
+#pragma once
+
+#include "ves/control/admittance_model.hpp"
+#include "ves/control/force_measurement.hpp"
+#include "ves/control/program.hpp"
+#include "ves/control/safety_checks.hpp"
+#include "ves/control/servo.hpp"
+#include "ves/robot/payload.hpp"
+
+namespace ves {
+
+/// What goes beyond the report (control/servo.hpp); all off: as published.
+struct Compensation {
+  bool feed_forward = false;  // the servos' lag taken out of the reference
+  bool observer = false;      // the servo model beside the servos: lengths below a count
+  bool inertia = false;       // the robot's inertia taken out of the wrench, and into the base
+  int mass_update = 1;        // [-] ticks for which the robot's composite body is kept
+  double ramp = 0.5;          // [s] over which they come in, and go out
+  double jitter = 0.0;        // [s] by which the time of a leg's reading may be wrong
+
+  bool any() const noexcept { return feed_forward || observer; }
+};
+
+/// Mean decelerations of a braking motion.
+struct Braking {
+  double translation = 0.0;  // [m/s^2]
+  double rotation = 0.0;     // [rad/s^2]
+};
+
+/// How fast a motion may be for which nobody has said how fast.
+struct GentleMotion {
+  double speed = 0.05;           // [m/s] peak
+  double rotation = 0.10;        // [rad/s] peak
+  Braking braking = {1.5, 2.5};  // of moves that begin in motion, and before the envelope
+};
+
+/// Whether admittance control with this base, robot and machine decays (analysis/gate.hpp).
+enum class Stability : std::int32_t {
+  kUnknown,   // nobody has looked: refused
+  kStable,    // begins
+  kUnstable,  // refused
+  kForced     // somebody wants it, whatever it does
+};
+inline constexpr std::string_view kStabilityNames[] = {"unknown", "stable", "unstable", "forced"};
+
+struct ControllerConfig {
+  std::int64_t period = 10'000'000;  // [ns]
+  Geometry geometry;
+  ForceSensor sensor;
+  Vec6 bias = Vec6::Zero();          // [count] until a calibration replaces it
+  Payload payload;                   // the controller's model of it
+  Vec3 gravity = {0.0, 0.0, -9.81};  // [m/s^2] g_I
+  ModalModel admittance;
+  LegCodec legs;
+  ServoModel servo;  // the controller's model of the servos
+  Compensation compensation;
+  SafetyLimits safety;
+  Program program;
+  RecordedPath path;                  // of its path segments
+  GentleMotion gentle;                // of moves and the return
+  Braking stop_braking = {5.0, 8.5};  // of a controlled stop
+  int arming_samples = 10;            // [-] consecutive ticks with a new sample before arming
+  StillnessLimits stillness;          // of a calibration
+  double tare_ramp = 1.0;             // [s] over which a tare takes effect
+  Stability stability = Stability::kUnknown;                // of admittance control as configured,
+  Stability stability_uncompensated = Stability::kUnknown;  // and with the compensation out
+
+  /// Of admittance control, its compensation in or out.
+  Stability stabilityOf(bool compensated) const noexcept {
+    return compensated ? stability : stability_uncompensated;
+  }
+  double periodSeconds() const noexcept {  // [s]
+    return static_cast<double>(period) * kSecondPerNanosecond;
+  }
+};
+
+}  // namespace ves

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Where the legs and the platform are: counts to lengths (2.7b), implausible readings left out,
+// forward kinematics (2.23), and the servo model beside the servos.
+#pragma once
+
+#include "ves/control/leg_commander.hpp"
+#include "ves/control/monitors.hpp"
+#include "ves/control/tick_clock.hpp"
+
+namespace ves {
+
+/// The legs and the platform as measured.
+struct Measured {
+  Vec6 L = Vec6::Zero();  // [m]
+  Transform X_IP;         // by forward kinematics of L; the last that was found
+  Pose pose;              // X_IP about home
+  bool solved = false;    // forward kinematics found X_IP for this L
+};
+
+class LegEstimator {
+ public:
+  explicit LegEstimator(const ControllerConfig& config);
+
+  /// `following`: the legs follow what was sent.
+  const Measured& update(const SampleStream& samples, const Elapsed& elapsed, bool following,
+                         const LegCommander& sent) noexcept;
+
+  const Measured& measured() const noexcept { return measured_; }
+  const LegReadings& readings() const noexcept { return readings_; }
+  const Vec6& recentSpeed() const noexcept { return speed_.speed(); }  // [m/s] as commanded
+  const ServoObserver& servo() const noexcept { return servo_; }
+  /// Measured lengths, and rates and accelerations by the servo model as the sensor's filter shows
+  /// them.
+  LegMotion filteredMotion() const noexcept {
+    return {measured_.L, servo_.velocity(), servo_.filteredAcceleration()};
+  }
+
+ private:
+  void observe(const Elapsed& elapsed, bool fresh, const LegCounts& sent) noexcept;
+
+  Geometry geometry_;
+  LegCodec codec_;
+  double period_;        // [s]
+  double reading_jump_;  // [m] of a leg at rest, from one sample to the next
+  bool observes_;
+  ServoObserver servo_;
+  LegReadings readings_;
+  LegSpeed speed_;
+  Measured measured_;
+};
+
+}  // namespace ves

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// What the platform should do next: the admittance model, or trajectory generation along a plan.
+#pragma once
+
+#include "ves/control/admittance_control.hpp"
+#include "ves/control/motion_plan.hpp"
+
+namespace ves {
+
+class MotionGenerator {
+ public:
+  explicit MotionGenerator(const ControllerConfig& config)
+      : settings_{config.periodSeconds(), config.gentle}, path_(config.path), admittance_(config) {}
+
+  /// Begins a segment at `tick` from what was last commanded; admittance control with the composite
+  /// body M_1.
+  void begin(const Segment& segment, std::int64_t tick, const Mat6& M_1) noexcept;
+  /// Begins to brake, and then to stay.
+  void brake(const Braking& braking) noexcept;
+  /// Begins a gentle move to the home pose.
+  void goHome() noexcept;
+
+  /// (C.2) to (C.7): the next state of the base under F_Po_I. `L` [m]: lengths last commanded.
+  PathPoint<6> admittanceModel(const Wrench& F_Po_I, const Mat6& M_1, double share,
+                               const JointVector& q, const Vec6& L,
+                               const PathChecks& checks) noexcept;
+  /// (C.8) to (C.10), moves and recorded paths: where to be in this tick.
+  PathPoint<6> trajectoryGeneration() noexcept;
+
+  /// What was commanded in this tick: `next_state` if it is meant for the next one.
+  void commit(const PathPoint<6>& x, bool next_state) noexcept;
+  /// The last commanded pose is held from now on.
+  void hold() noexcept;
+
+  SegmentKind kind() const noexcept { return segment_.kind; }
+  /// The plan is at its end; a watch at `tick` too. A calibration ends by itself.
+  bool over(std::int64_t tick) const noexcept;
+  bool moving() const noexcept { return !motion_.x_dot.isZero(0.0); }
+  /// Ticks after `tick` in which a watch looks at nothing.
+  std::int64_t idleTicks(std::int64_t tick) const noexcept;
+
+  const PathPoint<6>& motion() const noexcept { return motion_; }  // last commanded
+  const Vec6& desired() const noexcept { return desired_; }        // at this very tick
+  const AdmittanceControl& admittance() const noexcept { return admittance_; }
+  MotionPlan planned(const Segment& segment) const noexcept {
+    return MotionPlan::of(settings_, segment, motion_);
+  }
+  const RecordedPath& path() const noexcept { return path_; }
+
+ private:
+  PlanSettings settings_;
+  RecordedPath path_;
+  AdmittanceControl admittance_;
+  Segment segment_;
+  MotionPlan plan_;
+  std::int64_t n_ = 0;           // [-] periods of the plan so far
+  std::int64_t start_tick_ = 0;  // [-] of the segment
+  PathPoint<6> motion_;
+  Vec6 desired_ = Vec6::Zero();
+};
+
+}  // namespace ves

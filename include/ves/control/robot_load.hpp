@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// What the robot puts on the sensor by being there: its weight, and the inertia of its body while
+// the joints stand. The controller's model of both.
+#pragma once
+
+#include "ves/control/controller_config.hpp"
+#include "ves/math/butterworth.hpp"
+
+namespace ves {
+
+/// The weight of everything the sensor carries.
+class StaticLoad {
+ public:
+  explicit StaticLoad(const ControllerConfig& config);
+
+  /// For joints at q, the platform turned by R_IP. `share` [-] of the compensation is in;
+  /// `engaged`: the legs follow, so that the weight has a past.
+  void update(const JointVector& q, const Mat3& R_IP, bool engaged, double share) noexcept;
+
+  /// [count] what the weight alone would read, without a bias.
+  const Vec6& counts() const noexcept { return counts_; }
+  /// F_So_S, on its way to the filtered one of the inertia's compensation: a turn of the robot
+  /// moves the weight at once, the measurement only after the sensor's filter.
+  const Wrench& wrench() const noexcept { return F_So_S_; }
+
+ private:
+  Payload payload_;
+  Vec3 gravity_;
+  Mat6 S_proc_;  // [count per N | N m]
+  bool filters_;
+  Butterworth2<6> filter_;  // the sensor's
+  Butterworth2<6>::Step filter_step_;
+  Vec6 counts_ = Vec6::Zero();
+  Wrench F_So_S_;
+};
+
+/// The robot's inertia as the platform moves, its joints taken as locked.
+class RobotInertia {
+ public:
+  explicit RobotInertia(const ControllerConfig& config);
+
+  /// F_Po_I that it takes to move the composite body; zero when that is not compensated, or before
+  /// the legs are `engaged`. `count` [-] of the tick; `legs` with the accelerations that the
+  /// sensor's filter shows; `share` [-] of the compensation that is in.
+  Wrench update(std::int64_t count, const JointVector& q, const Transform& X_IP,
+                const LegMotion& legs, bool engaged, double share) noexcept;
+
+  /// Of the composite body about Po in I, times the share. [kg, kg m, kg m^2]
+  const Mat6& M_1() const noexcept { return M_1_; }
+
+ private:
+  bool compensated_;
+  int mass_update_;  // [-] ticks for which a composite body is kept
+  Geometry geometry_;
+  RobotModel carried_;
+  Transform X_PL0_;
+  RigidBody composite_P_;
+  Mat6 M_1_ = Mat6::Zero();
+};
+
+}  // namespace ves

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// All safety checks of a tick, collected into one set.
+#pragma once
+
+#include "ves/control/inverse_kinematics.hpp"
+#include "ves/control/leg_estimator.hpp"
+#include "ves/control/path_checks.hpp"
+
+namespace ves {
+
+/// Where a tick's command finds the legs. [m]
+struct LegContext {
+  Vec6 last;      // commanded before
+  Vec6 expected;  // where they should be now
+};
+
+class SafetyMonitor {
+ public:
+  SafetyMonitor(const SafetyLimits& limits, const Geometry& geometry, double period)
+      : checks_(limits, geometry), period_(period) {}
+
+  /// The memories of this tick: late ticks, and the sensor's readings beside those of the static
+  /// load [count].
+  void watch(const Elapsed& elapsed, const SampleStream& samples,
+             const Vec6& static_counts) noexcept;
+
+  /// Every check of Appendix C and beyond, of what would be commanded. `conflict`: another node
+  /// was heard on the bus.
+  Tripped check(const Proposal& proposal, const LegContext& context, const SampleStream& samples,
+                const LegEstimator& legs, const Wrench& dynamic, const Oscillation& oscillation,
+                bool conflict) const noexcept;
+
+  const PathChecks& path() const noexcept { return checks_; }
+
+ private:
+  PathChecks checks_;
+  double period_;  // [s]
+  FrozenSensor frozen_;
+  Overruns overruns_;
+};
+
+}  // namespace ves

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// The bias of the force-torque sensor: from the configuration, by a calibration (report, 2.3), or
+// by a tare while things run.
+#pragma once
+
+#include "ves/control/controller_config.hpp"
+#include "ves/math/quintic.hpp"
+
+namespace ves {
+
+/// The bias slides to what the sensor reads beyond the static load, on average: the admittance
+/// model never sees a step.
+class Tare {
+ public:
+  Tare(double ramp, double period, double limit) : ramp_(ramp), period_(period), limit_(limit) {}
+
+  void begin() noexcept;
+  void cancel() noexcept { state_ = State::kNone; }
+  bool running() const noexcept { return state_ != State::kNone; }
+
+  /// A tick: `static_counts` [count] is what the static load alone would read. Changes `bias`.
+  void step(const Sample& sample, bool fresh, const Vec6& static_counts, Vec6& bias) noexcept;
+
+ private:
+  enum class State { kNone, kAveraging, kRamping };
+
+  double ramp_;    // [s]
+  double period_;  // [s]
+  double limit_;   // [count] of a bias; more is a load, or a fault
+  State state_ = State::kNone;
+  ChannelStatistics statistics_;
+  Quintic<6> path_;     // [count]
+  std::int64_t n_ = 0;  // [-] ticks since the ramp began
+};
+
+class SensorBias {
+ public:
+  explicit SensorBias(const ControllerConfig& config)
+      : tare_(config.tare_ramp, config.periodSeconds(), config.stillness.bias),
+        calibration_(config.stillness),
+        bias_(config.bias) {}
+
+  void beginTare() noexcept { tare_.begin(); }
+  void cancelTare() noexcept { tare_.cancel(); }
+  bool taring() const noexcept { return tare_.running(); }
+  void stepTare(const Sample& sample, bool fresh, const Vec6& static_counts) noexcept {
+    tare_.step(sample, fresh, static_counts, bias_);
+  }
+
+  void beginCalibration() noexcept { calibration_.begin(); }
+  void calibrate(const Sample& sample, bool fresh, const Vec6& static_counts) noexcept;
+
+  const Vec6& counts() const noexcept { return bias_; }  // [count]
+  const Calibration& calibration() const noexcept { return calibration_; }
+  /// Of the last calibration that succeeded. [count]
+  const Vec6& deviation() const noexcept { return deviation_; }
+  const Vec6& standardError() const noexcept { return standard_error_; }
+
+ private:
+  Tare tare_;
+  Calibration calibration_;
+  Vec6 bias_;
+  Vec6 deviation_ = Vec6::Zero(), standard_error_ = Vec6::Zero();
+};
+
+}  // namespace ves

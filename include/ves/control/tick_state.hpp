@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// What goes into a tick of testPlatform, and what comes out. The state is a report: the next tick
+// reads nothing of it.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+#include "ves/control/force_measurement.hpp"
+#include "ves/control/program.hpp"
+#include "ves/control/safety_checks.hpp"
+#include "ves/control/sample.hpp"
+
+namespace ves {
+
+enum class Phase : std::int32_t {
+  kDisarmed,   // the legs ignore commands; waiting for a fresh, healthy stream and a start
+  kArmed,      // holding still; the first command is the measured pose
+  kRunning,    // a segment: of the program, or an order's
+  kReturning,  // gently home
+  kParked,     // at home, done
+  kStopped,    // a check tripped; holding the last checked lengths
+  kStopping    // a controlled stop: braking along the motion
+};
+
+std::string_view name(Phase phase) noexcept;
+
+struct TickInput {
+  std::int64_t tick = 0;  // [-] counts controller periods, missed ones included
+  Sample sample;          // the newest
+  Order order;
+  bool rival = false;     // another controller or machine was heard since the last tick
+  bool ran_long = false;  // ticks were missed because the last one took too long; else it woke late
+};
+
+/// Everything one tick knew and decided.
+struct TickState {
+  std::int64_t tick = 0;              // [-]
+  std::int64_t count = -1;            // [-] ticks run before this one
+  std::int64_t sample_sequence = -1;  // [-] of the sample used
+  Phase phase = Phase::kDisarmed;
+  std::int32_t segment = -1;               // [-] of the program, -1 outside it
+  SegmentKind kind = SegmentKind::kCount;  // of what runs; kCount: nothing
+  OrderId order;                           // the last one given
+  Check refused_by = Check::kCount;        // of a path that was refused
+  Refusal refusal = Refusal::kNone;        // of it
+  std::int64_t idle = 0;                   // [-] ticks to come of which nothing is expected
+  std::int32_t age = 0;                    // [-] ticks since the sample was new
+  Wrench total, fixed, dynamic;    // F_Po_I measured; of gravity (the report's static); difference
+  Wrench inertial;                 // of the robot's composite body, left out of dynamic
+  double compensated = 0.0;        // [-] share of the compensation that is in
+  PathPoint<6> motion;             // commanded coordinates about home, rates, accelerations
+  Vec6 due = Vec6::Zero();         // coordinates that the platform should have at this very tick
+  LegMotion legs;                  // commanded
+  Vec6 reference = Vec6::Zero();   // [m] what the servos are told, so that the legs go there
+  Vec6 L_measured = Vec6::Zero();  // [m]
+  Pose measured;                   // about home, from L_measured
+  Vec6 bias = Vec6::Zero();        // [count]
+  Calibration::Status calibration = Calibration::Status::kNone;  // of the last one asked for
+  Unrest unrest = Unrest::kNone;                                 // what it last saw moving
+  std::int32_t unrest_index = 0;                                 // [-] which one, from 0
+  double unrest_amount = 0.0;                                    // [count | rad | m]
+  Vec6 deviation = Vec6::Zero();                                 // [count] of a channel's samples
+  Vec6 standard_error = Vec6::Zero();                            // [count] of the bias
+  bool cut_short = false;        // the program: a calibration or a start was refused
+  double slowed = 1.0;           // [-] share of the admittance model's step that was taken
+  std::int64_t late_ticks = 0;   // [-] so far
+  Tripped tripped;               // in this tick
+  Tripped latched;               // since the start
+  Check cause = Check::kCount;   // the first to latch
+  std::int64_t cause_tick = -1;  // [-]
+  LegCommand command;
+};
+
+}  // namespace ves

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// The fields of the messages in the order of their definitions: what replay names, series.csv
+// writes and comparisons point at.
+#pragma once
+
+#include <string>
+#include <type_traits>
+
+#include "ves/transport/messages.hpp"
+
+namespace ves {
+
+/// Calls f(name, value) for every field of a message but its header; lists are arrays.
+template <typename F>
+void forEachField(const state_t& m, F f) {
+  f("count", m.count);
+  f("sample_sequence", m.sample_sequence);
+  f("request", m.request);
+  f("order_source", m.order_source);
+  f("order_sequence", m.order_sequence);
+  f("refusal", m.refusal);
+  f("refused_by", m.refused_by);
+  f("rival", m.rival);
+  f("ran_long", m.ran_long);
+  f("phase", m.phase);
+  f("segment", m.segment);
+  f("kind", m.kind);
+  f("idle", m.idle);
+  f("age", m.age);
+  f("total", m.total);
+  f("fixed", m.fixed);
+  f("inertial", m.inertial);
+  f("dynamic", m.dynamic);
+  f("x", m.x);
+  f("x_dot", m.x_dot);
+  f("x_ddot", m.x_ddot);
+  f("x_due", m.x_due);
+  f("leg", m.leg);
+  f("leg_dot", m.leg_dot);
+  f("leg_ddot", m.leg_ddot);
+  f("compensated", m.compensated);
+  f("reference", m.reference);
+  f("leg_measured", m.leg_measured);
+  f("x_measured", m.x_measured);
+  f("bias", m.bias);
+  f("calibration", m.calibration);
+  f("unrest", m.unrest);
+  f("unrest_index", m.unrest_index);
+  f("unrest_amount", m.unrest_amount);
+  f("deviation", m.deviation);
+  f("standard_error", m.standard_error);
+  f("tripped", m.tripped);
+  f("latched", m.latched);
+  f("cause", m.cause);
+  f("cause_tick", m.cause_tick);
+  f("cut_short", m.cut_short);
+  f("slowed", m.slowed);
+  f("late_ticks", m.late_ticks);
+  f("engaged", m.engaged);
+  f("park", m.park);
+  f("counts", m.counts);
+}
+
+template <typename F>
+void forEachField(const leg_command_t& m, F f) {
+  f("engaged", m.engaged);
+  f("segment", m.segment);
+  f("park", m.park);
+  f("counts", m.counts);
+}
+
+inline constexpr std::size_t kFingerprintSize = 8;  // [B] of every encoded message
+inline constexpr std::size_t kHeaderSize = 32;      // [B] of header_t, which leads every message
+
+/// "state_t.x[2]": whose encoding holds the byte at `offset` of a Message.
+template <typename Message>
+std::string fieldAt(std::size_t offset) {
+  const std::string type = Message::getTypeName();
+  if (offset < kFingerprintSize) return type;
+  std::size_t end = kFingerprintSize + kHeaderSize;
+  if (offset < end) return type + ".header";
+  std::string found = type;
+  forEachField(Message{}, [&](const char* name, const auto& value) {
+    using T = std::remove_cvref_t<decltype(value)>;
+    const std::size_t begin = end;
+    end += sizeof value;
+    if (offset < begin || offset >= end) return;
+    found += std::string(".") + name;
+    if constexpr (std::is_array_v<T>)
+      found += "[" + std::to_string((offset - begin) / sizeof(std::remove_extent_t<T>)) + "]";
+  });
+  return found;
+}
+
+}  // namespace ves

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/control/admittance_control.hpp"
+
+#include "ves/control/motion_plan.hpp"
+
+namespace ves {
+
+AdmittanceControl::AdmittanceControl(const ControllerConfig& config)
+    : model_(config.admittance, config.periodSeconds(),
+             config.compensation.inertia ? wrenchDelay(config.servo, config.periodSeconds()) : 0.0),
+      period_(config.periodSeconds()),
+      joint_moves_(config.stillness.joint),
+      growth_floor_(config.safety.growth_floor),
+      braking_(config.gentle.braking) {}
+
+void AdmittanceControl::begin(const Vec6& x, const Mat6& M_1) noexcept {
+  model_.reset(x, M_1);
+  oscillation_.reset();
+}
+
+const PathPoint<6>& AdmittanceControl::step(const Wrench& F_Po_I, const Mat6& M_1, double share,
+                                            const JointVector& q, const Vec6& last, const Vec6& L,
+                                            const PathChecks& checks) noexcept {
+  if (F_Po_I.stacked().allFinite()) {
+    model_.step(F_Po_I, M_1, share);
+    slowInsideEnvelope(last, L, checks);
+    const bool held = scale_ < 1.0 && model_.kineticEnergy() > growth_floor_;
+    oscillation_.take(model_.energy(), held, q, joint_moves_, period_, growth_floor_);
+  }
+  return model_.motion();
+}
+
+/// Slows the motion as a whole, never one leg, so that it can always come to rest, braking gently
+/// along its path, where every path check still passes.
+void AdmittanceControl::slowInsideEnvelope(const Vec6& last, const Vec6& L,
+                                           const PathChecks& checks) noexcept {
+  const Geometry& geometry = checks.geometry();
+  const Vec6 step = model_.motion().x - last;
+  const auto fits = [&](double scale) {
+    const Vec6 v = scale * step / period_;
+    const double brake_time = brakeTime(v, braking_);
+    const Pose next = Pose::from(last + scale * step);
+    const Pose rest = Pose::from(last + scale * step + 0.5 * brake_time * v);
+    const Transform X_rest = geometry.fromHome(rest);
+    const Vec6 L_next = legLengths(geometry, geometry.fromHome(next));
+    return !checks.pose(X_rest, rest, legLengths(geometry, X_rest)).any() &&
+           !checks.step(L_next, L, period_).any();
+  };
+  scale_ = 1.0;
+  if (fits(1.0)) return;
+  constexpr int kHalvings = 10;
+  double low = 0.0, high = 1.0;
+  for (int i = 0; i < kHalvings; ++i) {
+    const double middle = 0.5 * (low + high);
+    (fits(middle) ? low : high) = middle;
+  }
+  scale_ = low;
+  model_.slow(low);
+}
+
+}  // namespace ves

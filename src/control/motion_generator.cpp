@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/control/motion_generator.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ves {
+
+void MotionGenerator::begin(const Segment& segment, std::int64_t tick, const Mat6& M_1) noexcept {
+  segment_ = segment;
+  plan_ = planned(segment);
+  n_ = 0;
+  start_tick_ = tick;
+  if (segment.kind == SegmentKind::kAdmittance) admittance_.begin(motion_.x, M_1);
+}
+
+void MotionGenerator::brake(const Braking& braking) noexcept {
+  segment_ = {};
+  segment_.kind = SegmentKind::kMove;
+  plan_ = MotionPlan::brake(settings_, motion_, braking);
+  n_ = 0;
+}
+
+void MotionGenerator::goHome() noexcept {
+  segment_ = {};
+  segment_.kind = SegmentKind::kMove;
+  plan_ = MotionPlan::move(settings_, motion_, Vec6::Zero(), 0.0);
+  n_ = 0;
+}
+
+PathPoint<6> MotionGenerator::admittanceModel(const Wrench& F_Po_I, const Mat6& M_1, double share,
+                                              const JointVector& q, const Vec6& L,
+                                              const PathChecks& checks) noexcept {
+  ++n_;
+  return admittance_.step(F_Po_I, M_1, share, q, motion_.x, L, checks);
+}
+
+PathPoint<6> MotionGenerator::trajectoryGeneration() noexcept {
+  ++n_;  // where a plan starts, the platform is already
+  switch (segment_.kind) {
+    case SegmentKind::kMove:
+    case SegmentKind::kTrajectory:
+    case SegmentKind::kPath: return plan_.at(n_, path_);
+    case SegmentKind::kCalibration:
+    case SegmentKind::kWatch:
+    case SegmentKind::kAdmittance:
+    case SegmentKind::kCount: break;
+  }
+  return atRest(motion_.x);
+}
+
+void MotionGenerator::commit(const PathPoint<6>& x, bool next_state) noexcept {
+  desired_ = next_state ? motion_.x : x.x;
+  motion_ = x;
+}
+
+void MotionGenerator::hold() noexcept {
+  motion_ = atRest(motion_.x);
+  admittance_.forget();
+}
+
+bool MotionGenerator::over(std::int64_t tick) const noexcept {
+  return (segment_.kind == SegmentKind::kWatch ? tick - start_tick_ : n_) >= plan_.steps();
+}
+
+std::int64_t MotionGenerator::idleTicks(std::int64_t tick) const noexcept {
+  if (segment_.kind != SegmentKind::kWatch) return 0;
+  const std::int64_t interval = std::llround(segment_.interval / settings_.period);
+  if (interval <= kCalibrationSamples) return 0;
+  const std::int64_t since = tick - start_tick_, into = since % interval;
+  if (into < kCalibrationSamples - 1) return 0;
+  return std::max<std::int64_t>(0, std::min(interval - into, plan_.steps() - since) - 1);
+}
+
+}  // namespace ves

@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/control/supervisor.hpp"
+
+namespace ves {
+namespace {
+
+/// More is wrong than that the stream of samples has not begun.
+bool forbids(Tripped tripped) {
+  Tripped waiting;
+  waiting.require(Check::kStale, false);
+  waiting.require(Check::kOverrun, false);
+  return (tripped.bits() & ~waiting.bits()) != 0;
+}
+
+/// Why a loop of this verdict may not be closed.
+Refusal refusesLoop(Stability stability) {
+  switch (stability) {
+    case Stability::kStable:
+    case Stability::kForced: return Refusal::kNone;
+    case Stability::kUnstable: return Refusal::kUnstable;
+    case Stability::kUnknown: break;
+  }
+  return Refusal::kUnassessed;
+}
+
+}  // namespace
+
+void Supervisor::handle(const Order& order, const Situation& now, Actuation act) noexcept {
+  if (order.request == Request::kNone) return;
+  order_ = order.id;
+  refusal_ = obey(order, now, act);
+}
+
+Refusal Supervisor::obey(const Order& order, const Situation& now, Actuation act) noexcept {
+  switch (order.request) {
+    case Request::kNone:
+    case Request::kCount: return Refusal::kNone;
+    case Request::kArm:
+    case Request::kStart: return arm(order.request, now, act);
+    case Request::kStop:
+      pending_request_ = Request::kNone;
+      if (phase_ == Phase::kArmed || phase_ == Phase::kRunning) beginReturn(now, act);
+      operator_present_ = false;
+      return Refusal::kNone;
+    case Request::kRun: return run(order.segment, now, act);
+    case Request::kHold:
+      pending_request_ = Request::kNone;
+      if (!ours()) return Refusal::kNotArmed;
+      operator_present_ = true;
+      if (phase_ == Phase::kArmed) return Refusal::kNone;
+      phase_ = Phase::kRunning;
+      segment_ = -1;
+      act.motion.brake(now.config.gentle.braking);
+      return Refusal::kNone;
+    case Request::kTare:
+      if (!ours()) return Refusal::kNotArmed;
+      if (runs(act.motion, SegmentKind::kCalibration) || act.bias.taring()) return Refusal::kBusy;
+      act.bias.beginTare();
+      return Refusal::kNone;
+    case Request::kCompensate: return compensate(true, now, act);
+    case Request::kUncompensate: return compensate(false, now, act);
+    case Request::kReset: return reset(act);
+  }
+  return Refusal::kNone;
+}
+
+/// The legs are taken, or soon will be gone from.
+bool Supervisor::ours() const noexcept {
+  return phase_ == Phase::kArmed || phase_ == Phase::kRunning || phase_ == Phase::kReturning;
+}
+
+Refusal Supervisor::arm(Request request, const Situation& now, Actuation act) noexcept {
+  const Refusal unstable = refusesLoop(now.config.stabilityOf(act.share.wanted()));
+  if (request == Request::kStart && unstable != Refusal::kNone &&
+      wantsAdmittance(now.config.program))
+    return unstable;
+  if (phase_ == Phase::kDisarmed) {
+    if (forbids(tripped_)) return Refusal::kCauseRemains;
+    pending_request_ = request;
+    operator_present_ = request == Request::kArm;
+    return Refusal::kNone;
+  }
+  if (request == Request::kArm) return ours() ? Refusal::kArmed : Refusal::kNotArmed;
+  if (phase_ != Phase::kArmed) return ours() ? Refusal::kBusy : Refusal::kNotArmed;
+  beginProgram(0, now, act);
+  return Refusal::kNone;
+}
+
+/// Begins an order's segment, unless its path, gone through beforehand, fails a check.
+Refusal Supervisor::run(const Segment& segment, const Situation& now, Actuation act) noexcept {
+  if (!ours()) return Refusal::kNotArmed;
+  if (phase_ != Phase::kArmed) return Refusal::kBusy;
+  if (segment.kind == SegmentKind::kAdmittance) {
+    const Refusal refusal = refusesAdmittance(now, act);
+    if (refusal != Refusal::kNone) return refusal;
+  }
+  if (segment.kind == SegmentKind::kMove || segment.kind == SegmentKind::kTrajectory) {
+    const Check failure = firstFailure(act.motion.planned(segment), now.path, now.L,
+                                       now.config.periodSeconds(), act.motion.path());
+    if (failure != Check::kCount) {
+      refused_by_ = failure;
+      return Refusal::kOutside;
+    }
+  }
+  begin(segment, now, act);
+  return Refusal::kNone;
+}
+
+/// A loop that runs is not changed to one that would diverge.
+Refusal Supervisor::compensate(bool in, const Situation& now, Actuation act) noexcept {
+  if (!act.share.exists()) return Refusal::kNoCompensation;
+  const Refusal unstable = refusesLoop(now.config.stabilityOf(in));
+  if (unstable != Refusal::kNone && runs(act.motion, SegmentKind::kAdmittance)) return unstable;
+  act.share.want(in);
+  return Refusal::kNone;
+}
+
+Refusal Supervisor::reset(Actuation act) noexcept {
+  if (phase_ != Phase::kStopped) return Refusal::kNotStopped;
+  if (tripped_.any()) return Refusal::kCauseRemains;
+  phase_ = Phase::kDisarmed;
+  segment_ = -1;
+  latched_ = {};
+  cause_ = Check::kCount;
+  cause_tick_ = -1;
+  act.samples.restart();
+  pending_request_ = Request::kNone;
+  return Refusal::kNone;
+}
+
+/// Admittance control should begin with nothing but the base's own motion to come.
+Refusal Supervisor::refusesAdmittance(const Situation& now, Actuation act) const noexcept {
+  const Refusal unstable = refusesLoop(now.config.stabilityOf(act.share.wanted()));
+  if (unstable != Refusal::kNone) return unstable;
+  const bool unloaded = now.dynamic.f.norm() <= now.config.safety.start_force &&
+                        now.dynamic.n.norm() <= now.config.safety.start_moment;
+  return unloaded ? Refusal::kNone : Refusal::kLoaded;
+}
+
+void Supervisor::advance(const Situation& now, Actuation act) noexcept {
+  switch (phase_) {
+    case Phase::kDisarmed:
+      // A request does not outlive a cause: releasing a button must move nothing.
+      if (forbids(tripped_)) pending_request_ = Request::kNone;
+      if (pending_request_ != Request::kNone && now.fresh_ticks > now.config.arming_samples &&
+          !tripped_.any())
+        phase_ = Phase::kArmed;
+      act.share.reset();
+      break;
+    case Phase::kArmed:
+      if (pending_request_ == Request::kStart) beginProgram(0, now, act);
+      pending_request_ = Request::kNone;
+      break;
+    case Phase::kRunning:
+      if (segmentIsOver(now, act)) endSegment(now, act);
+      break;
+    case Phase::kReturning:
+      if (!act.motion.over(now.tick)) break;
+      phase_ = operator_present_ ? Phase::kArmed : Phase::kParked;
+      if (operator_present_) segment_ = -1;
+      break;
+    case Phase::kStopping:
+      if (act.motion.over(now.tick)) phase_ = Phase::kStopped;
+      break;
+    case Phase::kParked:
+    case Phase::kStopped: break;
+  }
+}
+
+bool Supervisor::segmentIsOver(const Situation& now, Actuation act) const noexcept {
+  if (act.motion.kind() == SegmentKind::kCalibration)
+    return act.bias.calibration().status() != Calibration::Status::kTaking;
+  return act.motion.over(now.tick);
+}
+
+void Supervisor::endSegment(const Situation& now, Actuation act) noexcept {
+  const bool in_program = segment_ >= 0;
+  if (in_program && act.motion.kind() == SegmentKind::kCalibration &&
+      act.bias.calibration().status() == Calibration::Status::kRefused) {
+    aborted_ = true;  // a program does not go on without the calibration it asked for
+    beginReturn(now, act);
+  } else if (act.motion.moving() && !nextBrakes(now.config.program)) {
+    act.motion.brake(now.config.gentle.braking);
+  } else if (in_program) {
+    beginProgram(segment_ + 1, now, act);
+  } else {
+    phase_ = Phase::kArmed;
+  }
+}
+
+/// What follows in the program begins by braking.
+bool Supervisor::nextBrakes(const Program& program) const noexcept {
+  if (segment_ < 0) return false;
+  const int next = segment_ + 1;
+  return next >= program.size ||
+         program.segments[static_cast<std::size_t>(next)].kind == SegmentKind::kMove;
+}
+
+void Supervisor::beginProgram(int at, const Situation& now, Actuation act) noexcept {
+  segment_ = at;
+  if (at == 0) aborted_ = false;
+  if (at >= now.config.program.size) {
+    beginReturn(now, act);
+    return;
+  }
+  const Segment& next = now.config.program.segments[static_cast<std::size_t>(at)];
+  const Refusal refusal =
+      next.kind == SegmentKind::kAdmittance ? refusesAdmittance(now, act) : Refusal::kNone;
+  if (refusal != Refusal::kNone) {
+    refusal_ = refusal;
+    aborted_ = true;
+    beginReturn(now, act);
+    return;
+  }
+  begin(next, now, act);
+}
+
+void Supervisor::begin(const Segment& segment, const Situation& now, Actuation act) noexcept {
+  phase_ = Phase::kRunning;
+  act.motion.begin(segment, now.tick, now.M_1);
+  if (segment.kind == SegmentKind::kCalibration) act.bias.beginCalibration();
+}
+
+void Supervisor::beginReturn(const Situation& now, Actuation act) noexcept {
+  phase_ = Phase::kReturning;
+  segment_ = now.config.program.size;
+  act.motion.goHome();
+}
+
+bool Supervisor::trip(Tripped tripped, const Situation& now, Actuation act) noexcept {
+  tripped_ = tripped;
+  if (phase_ == Phase::kDisarmed || !tripped.any()) return false;
+  latch(tripped, act);
+  if (phase_ == Phase::kStopped) return false;
+  const bool stopping = phase_ == Phase::kStopping;
+  if (!stopping) {
+    cause_ = tripped.first();
+    cause_tick_ = now.tick;
+  }
+  if (tripped.freeze()) {
+    phase_ = Phase::kStopped;
+    return false;
+  }
+  if (stopping) return false;
+  act.motion.brake(now.config.stop_braking);
+  phase_ = act.motion.over(now.tick) ? Phase::kStopped : Phase::kStopping;
+  return phase_ == Phase::kStopping;
+}
+
+void Supervisor::tripStopping(Tripped tripped, Actuation act) noexcept {
+  if (!tripped.freeze()) return;
+  latch(tripped, act);
+  phase_ = Phase::kStopped;
+}
+
+void Supervisor::latch(Tripped tripped, Actuation act) noexcept {
+  latched_ = latched_ | tripped;
+  act.bias.cancelTare();  // what it averages may be the fault
+}
+
+void Supervisor::report(TickState& state) const noexcept {
+  state.phase = phase_;
+  state.segment = segment_;
+  state.order = order_;
+  state.refusal = refusal_;
+  state.refused_by = refused_by_;
+  state.cut_short = aborted_;
+  state.tripped = tripped_;
+  state.latched = latched_;
+  state.cause = cause_;
+  state.cause_tick = cause_tick_;
+}
+
+}  // namespace ves

@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <arpa/inet.h>
+#include <signal.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <memory>
+#include <random>
+
+#include "rows.hpp"
+#include "ves/run/bus_observer.hpp"
+#include "ves/run/process.hpp"
+
+namespace ves {
+namespace {
+
+namespace fs = std::filesystem;
+using Arguments = std::vector<std::string>;
+
+constexpr double kLegSlack = 0.01;  // [m] by which a leg may swing past a limit
+
+/// A controller and a plant as processes, the controller in full swing.
+class Pair {
+ public:
+  Pair(const fs::path& config, const fs::path& programs)
+      : programs_(programs),
+        file_((config / "scenarios" / "z_sine.yaml").string()),
+        limits_(loadExperiment(file_).controller.safety) {
+    plant = std::make_unique<Process>(programs / "ves-plant", Arguments{file_});
+    startController({"--start"});
+  }
+  void startController(Arguments arguments) {
+    arguments.insert(arguments.begin(), file_);
+    // The machine may be busy; what a row injects is not that.
+    for (const char* set : {"safety.stall_ticks=60", "safety.overruns_per_second=50"})
+      arguments.insert(arguments.end(), {"--set", set});
+    controller = std::make_unique<Process>(programs_ / "ves-controller", arguments);
+  }
+  bool swinging(BusObserver& bus, std::int64_t commands = 300) const {
+    const std::int64_t from = bus.engaged;
+    return bus.until([&] { return bus.engaged > from + commands; });
+  }
+  const SafetyLimits& limits() const { return limits_; }
+
+  std::unique_ptr<Process> plant, controller;
+
+ private:
+  fs::path programs_;
+  std::string file_;
+  SafetyLimits limits_;
+};
+
+/// "legs 212 mm inside their limits"
+std::string margin(const BusObserver& bus, const SafetyLimits& limits) {
+  const double outside = bus.outside(limits);
+  return fmt::format("legs {:.0f} mm {} their limits", std::abs(outside) * 1e3,
+                     outside > 0.0 ? "OUTSIDE" : "inside");
+}
+
+/// Datagrams at the bus's address that are no LCM messages, or broken ones.
+void floodMalformed(int count) {
+  const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  sockaddr_in to{};
+  to.sin_family = AF_INET;
+  to.sin_port = htons(7667);
+  to.sin_addr.s_addr = inet_addr("239.255.76.67");
+  std::mt19937 random(1);
+  std::vector<std::uint8_t> packet(1400);
+  for (int i = 0; i < count; ++i) {
+    const std::size_t size = random() % packet.size();
+    for (std::size_t k = 0; k < size; ++k) packet[k] = static_cast<std::uint8_t>(random());
+    if (i % 3 && size > 16) {  // LCM's short-message magic, then a channel name of ours
+      const std::uint8_t head[] = {'L', 'C', '0', '2', 0, 0, 0, 1};
+      std::copy(std::begin(head), std::end(head), packet.begin());
+      const char channel[] = "VES_LEG_COMMAND";
+      if (size > 8 + sizeof channel && i % 3 == 1)
+        std::copy(std::begin(channel), std::end(channel), packet.begin() + 8);
+    }
+    sendto(fd, packet.data(), size, 0, reinterpret_cast<const sockaddr*>(&to), sizeof to);
+    if (i % 200 == 0) usleep(2000);
+  }
+  close(fd);
+}
+
+FaultOutcome neverSwung() { return outcome(false, "never in swing"); }
+
+FaultOutcome plantKilled(const fs::path& config, const fs::path& programs) {
+  BusObserver bus;
+  Pair pair(config, programs);
+  if (!pair.swinging(bus)) return neverSwung();
+  pair.plant->signal(SIGKILL);
+  pair.plant->wait();
+  const std::int64_t last_sample = bus.state.sample_sequence, last_tick = bus.state.header.sequence;
+  const bool stopped = bus.until([&] { return bus.phase() == Phase::kStopped; });
+  const std::int64_t waited = bus.state.cause_tick - last_tick;
+  FaultOutcome out =
+      outcome(stopped && bus.cause() == Check::kStale && pair.controller->wait() == 1,
+              fmt::format("{}: {}, {} samples after the last", name(bus.phase()), name(bus.cause()),
+                          bus.state.sample_sequence - last_sample),
+              std::max<std::int64_t>(0, waited));
+  return out;
+}
+
+FaultOutcome controllerKilled(const fs::path& config, const fs::path& programs,
+                              std::int64_t commands) {
+  BusObserver bus;
+  Pair pair(config, programs);
+  if (!pair.swinging(bus, commands)) return neverSwung();
+  pair.controller->signal(SIGKILL);
+  pair.controller->wait();
+  const bool rests = bus.rests();
+  const std::int64_t engaged = bus.engaged, dead = bus.controller;
+  pair.startController({"--no-menu"});
+  std::int64_t states = 0;
+  const bool waits = bus.until([&] {
+    if (bus.controller != dead && states == 0) states = bus.states;
+    return states > 0 && bus.states > states + 100;
+  });
+  return outcome(
+      rests && waits && bus.engaged == engaged && bus.outside(pair.limits()) <= kLegSlack,
+      fmt::format("legs {}, {}; successor engaged {} of {} ticks", rests ? "rest" : "MOVE",
+                  margin(bus, pair.limits()), bus.engaged - engaged, bus.states - states));
+}
+
+FaultOutcome malformedFlood(const fs::path& config, const fs::path& programs) {
+  BusObserver bus;
+  Pair pair(config, programs);
+  if (!pair.swinging(bus, 100)) return neverSwung();
+  floodMalformed(100'000);
+  const bool alive = pair.plant->running();
+  const int status = pair.controller->wait();
+  const bool rests = bus.rests();
+  const bool orderly = status == 0 || status == 1;
+  return outcome(alive && orderly && rests && bus.outside(pair.limits()) <= kLegSlack,
+                 fmt::format("plant {}, controller {}, legs {}, {}", alive ? "alive" : "DEAD",
+                             status == 0   ? "parked"
+                             : status == 1 ? fmt::format("stopped: {}", name(bus.cause()))
+                                           : fmt::format("ended with status {}", status),
+                             rests ? "rest" : "MOVE", margin(bus, pair.limits())));
+}
+
+FaultOutcome processorsHogged(const fs::path& config, const fs::path& programs) {
+  BusObserver bus;
+  Process hog1("/bin/sh", {"-c", "while :; do :; done"});
+  Process hog2("/bin/sh", {"-c", "while :; do :; done"});
+  Pair pair(config, programs);
+  const int status = pair.controller->wait();
+  bus.bus.drain();
+  // A stop is as good, when its cause is that time ran out.
+  const bool late = bus.cause() == Check::kOverrun || bus.cause() == Check::kStale;
+  return outcome((status == 0 || (status == 1 && late)) && bus.outside(pair.limits()) <= kLegSlack,
+                 fmt::format("{} with {} late ticks, {}",
+                             status == 0   ? "parked"
+                             : status == 1 ? fmt::format("stopped: {}", name(bus.cause()))
+                                           : fmt::format("ended with status {}", status),
+                             bus.state.late_ticks, margin(bus, pair.limits())));
+}
+
+}  // namespace
+
+std::vector<FaultRow> processRows(const fs::path& config, const fs::path& programs) {
+  // Another moment at each call, the same ones in each run.
+  const auto moments = std::make_shared<std::mt19937>(15);
+  return {{"F14", "the machine's process is killed", "controlled stop: sample age", true,
+           [=] { return plantKilled(config, programs); }},
+          {"F15", "the controller is killed",
+           "legs come to rest inside their limits; its successor waits", true,
+           [=] {
+             return controllerKilled(config, programs,
+                                     5 + static_cast<std::int64_t>((*moments)() % 700));
+           }},
+          {"F21", "100000 malformed datagrams on the bus",
+           "the run goes on or stops, and the legs rest", true,
+           [=] { return malformedFlood(config, programs); }},
+          {"F37", "both processors hogged", "the run goes on, or stops for lack of time", true,
+           [=] { return processorsHogged(config, programs); }}};
+}
+
+}  // namespace ves
