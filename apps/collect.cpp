@@ -6,7 +6,7 @@
 #include <iostream>
 
 #include "app.hpp"
-#include "ves/report/series.hpp"
+#include "ves/results/series.hpp"
 
 int main(int argc, char** argv) {
   using namespace ves;

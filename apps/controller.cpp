@@ -70,7 +70,7 @@ int console(ControllerOptions& options) {
   fmt::print("{}: {}\n", experiment.name, experiment.description);
   bool failed = false;
   const RunResult result = runConsole(experiment, console, failed);
-  fmt::print("{}", writeOutcome(console.launch.scenario.parent_path(), result, options.plots));
+  fmt::print("{}", writeResults(console.launch.scenario.parent_path(), result, options.plots));
   return result.good() && !failed ? kDone : kTripped;
 }
 

@@ -5,8 +5,8 @@
 #include <unistd.h>
 
 #include "runner.hpp"
-#include "ves/report/summary.hpp"
-#include "ves/run/doctor.hpp"
+#include "ves/doctor/doctor.hpp"
+#include "ves/results/summary.hpp"
 #include "ves/run/process.hpp"
 
 namespace {

@@ -8,7 +8,7 @@
 #include "ves/config/servo.hpp"
 #include "ves/identification/scenario.hpp"
 #include "ves/identification/servo_identification.hpp"
-#include "ves/report/rests.hpp"
+#include "ves/results/static_intervals.hpp"
 #include "ves/run/iterative_compensation.hpp"
 
 namespace {
@@ -70,8 +70,8 @@ int plan(const std::string& scenario, const PosePlanOptions& options, double spe
   return app::kDone;
 }
 
-std::vector<Rest> restsIn(const Series& series, const std::string& log) {
-  std::vector<Rest> rests = restsOf(series);
+std::vector<StaticInterval> restsIn(const Series& series, const std::string& log) {
+  std::vector<StaticInterval> rests = staticIntervals(series);
   if (rests.empty())
     throw InputError(fmt::format("{}: platform and robot never stand still for a second", log));
   return rests;
@@ -80,7 +80,7 @@ std::vector<Rest> restsIn(const Series& series, const std::string& log) {
 int masses(const std::string& log, const std::string& file) {
   const Series series = readSeries(log);
   const Experiment& e = series.experiment;
-  const std::vector<Rest> rests = restsIn(series, log);
+  const std::vector<StaticInterval> rests = restsIn(series, log);
   const StaticSetup setup = staticSetup(e.controller);
   const SeparableCombinations combinations =
       orRefuse(log, [&] { return separableCombinations(setup.robot); });

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // ves replay: a recorded run through the controller once more.
-#include "ves/replay/replay.hpp"
+#include "ves/run/replay.hpp"
 #include "app.hpp"
+#include "ves/base/build.hpp"
 
 int main(int argc, char** argv) {
   using namespace ves;
@@ -39,6 +40,11 @@ int main(int argc, char** argv) {
     });
     fmt::print("{}: {} (configuration {}, version {}), {} ticks replayed\n", log, r.name, r.hash,
                r.version, r.ticks);
+    if (!r.same_arithmetic)
+      fmt::print(
+          "this log is of a build with another arithmetic than this one's ({}): the last bit "
+          "may differ\n",
+          build().arithmetic);
     if (r.stability == Stability::kUnstable || r.stability == Stability::kUnknown)
       fmt::print("admittance control was refused: the stability of its loop was '{}'\n",
                  kStabilityNames[static_cast<std::size_t>(r.stability)]);

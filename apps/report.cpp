@@ -4,8 +4,8 @@
 #include <unistd.h>
 
 #include "runner.hpp"
-#include "ves/report/chapter4.hpp"
-#include "ves/report/summary.hpp"
+#include "ves/results/summary.hpp"
+#include "ves/validation/chapter4.hpp"
 
 int main(int argc, char** argv) {
   using namespace ves;
@@ -21,8 +21,8 @@ int main(int argc, char** argv) {
     const bool terminal = isatty(STDERR_FILENO);
     const std::int64_t start = monotonicNow();
     const Chapter4 chapter =
-        reproduceChapter4(app::configFolder(), folder, [&](const std::string& what, double done) {
-          fmt::print(stderr, "{}{:3.0f} %  {:<32}{}", terminal ? "\r" : "", 100.0 * done, what,
+        reproduceChapter4(app::configFolder(), folder, [&](const std::string& what, int run) {
+          fmt::print(stderr, "{}run {:3}  {:<32}{}", terminal ? "\r" : "", run, what,
                      terminal ? "" : "\n");
         });
     if (terminal) fmt::print(stderr, "\r{:40}\r", "");

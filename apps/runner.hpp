@@ -9,7 +9,7 @@
 
 #include "app.hpp"
 #include "ves/realtime/realtime.hpp"
-#include "ves/report/outcome.hpp"
+#include "ves/results/results.hpp"
 
 namespace ves::app {
 
@@ -86,7 +86,7 @@ inline int runExperiment(RunnerOptions& options) {
         [] { return stop_requested != 0; });
   }
   progress.end();
-  fmt::print("{}", writeOutcome(launch.scenario.parent_path(), result, options.plots));
+  fmt::print("{}", writeResults(launch.scenario.parent_path(), result, options.plots));
   return result.good() ? kDone : kTripped;
 }
 

@@ -6,13 +6,12 @@
 #include <fstream>
 
 #include "app.hpp"
+#include "ves/base/coordinates.hpp"
 #include "ves/config/base.hpp"
 
 namespace {
 
 using namespace ves;
-
-constexpr const char* kDirection[] = {"x", "y", "z", "alpha", "beta", "gamma"};
 
 int showModes(const std::string& name, const std::vector<std::string>& overrides) {
   const Base base = loadBase(findBase(name, app::configFolder()), overrides);
@@ -34,7 +33,7 @@ int showModes(const std::string& name, const std::vector<std::string>& overrides
   fmt::print("\n{} degrees of freedom; stiffness at the foot, other directions free:\n ",
              base.arm->frame.dofs());
   for (int i = 0; i < 6; ++i)
-    fmt::print(" {} {:.0f} {}{}", kDirection[i], 1.0 / C(i, i), i < 3 ? "N/m" : "N m/rad",
+    fmt::print(" {} {:.0f} {}{}", coordinate(i).name, 1.0 / C(i, i), i < 3 ? "N/m" : "N m/rad",
                i < 5 ? "," : "\n");
   return app::kDone;
 }
@@ -94,7 +93,7 @@ int simulateBoth(const std::string& scenario, const std::vector<std::string>& ov
   std::string csv = "t_s";
   for (const char* model : {"split", "whole"})
     for (int i = 0; i < 6; ++i)
-      csv += fmt::format(",{}_{}_{}", kDirection[i], model, i < 3 ? "m" : "rad");
+      csv += fmt::format(",{}_{}_{}", coordinate(i).name, model, coordinate(i).unit);
   csv += "\n";
   Range of_split, of_whole, apart;
   for (std::size_t i = 0; i < split.size(); ++i) {
@@ -109,10 +108,10 @@ int simulateBoth(const std::string& scenario, const std::vector<std::string>& ov
   fmt::print("  {:<8}{:>20}{:>20}{:>20}\n", "", "split, peak to peak", "whole, peak to peak",
              "largest difference");
   for (int i = 0; i < 6; ++i) {
-    const double scale = i < 3 ? 1e3 : 1.0 / kDegree;
-    const char* unit = i < 3 ? "mm" : "deg";
+    const double scale = coordinate(i).shown;
+    const std::string_view unit = coordinate(i).shown_unit;
     const auto cell = [&](double x) { return fmt::format("{:.5f} {:<3}", x * scale, unit); };
-    fmt::print("  {:<8}{:>20}{:>20}{:>20}\n", kDirection[i], cell(of_split.size()(i)),
+    fmt::print("  {:<8}{:>20}{:>20}{:>20}\n", coordinate(i).name, cell(of_split.size()(i)),
                cell(of_whole.size()(i)), cell(apart.high(i)));
   }
   if (!file.empty()) {

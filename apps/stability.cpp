@@ -8,7 +8,7 @@
 #include "runner.hpp"
 #include "ves/analysis/appendix_e.hpp"
 #include "ves/analysis/gate.hpp"
-#include "ves/report/gnuplot.hpp"
+#include "ves/results/gnuplot.hpp"
 
 namespace {
 
@@ -26,7 +26,7 @@ int showLoop(const Experiment& e) {
     for (const Direction direction : {Direction::kExtending, Direction::kRetracting}) {
       Loop some = loopOf(e.controller, e.plant, q, direction);
       some.base = softest(some.base, k);
-      const Slowest s = slowest(some);
+      const DominantRoot s = dominantRoot(some);
       fmt::print("   {:>+10.3f} at {:>7.3f} Hz {:<6}", s.growth, s.frequency,
                  decays(some) ? "" : "grows");
     }
@@ -61,7 +61,7 @@ const Parameter kParameters[] = {
     {"mass", "robot's inertia, times its own", 0.0, 10000.0,
      [](Loop& l, const Loop& o, double v) {
        l.robot_P = heavier(v, o.robot_P);
-       l.believed.robot_P = l.robot_P;
+       l.model.robot_P = l.robot_P;
      }},
     {"mass_error", "robot's inertia, times what the controller believes", 0.0, 100.0,
      [](Loop& l, const Loop& o, double v) { l.robot_P = heavier(v, o.robot_P); }},
@@ -70,7 +70,7 @@ const Parameter kParameters[] = {
     {"K_P", "K_P, times its own", 0.0, 100.0,
      [](Loop& l, const Loop& o, double v) {
        l.velocity_gain = v * o.velocity_gain;
-       l.believed.setGain(v * o.believed.gain());
+       l.model.setGain(v * o.model.gain());
      }},
     {"gain_error", "servo gain, times what the controller believes", 0.01, 100.0,
      [](Loop& l, const Loop& o, double v) { l.velocity_gain = v * o.velocity_gain; }},
@@ -80,7 +80,7 @@ const Parameter kParameters[] = {
      [](Loop& l, const Loop&, double v) { l.filter_cutoff = v; }},
     {"sensor", "cut-off of the sensor's filter [Hz]", 0.1, 10000.0,
      [](Loop& l, const Loop&, double v) {
-       l.sensor_cutoff = l.believed.servo.sensor_cutoff = 2.0 * M_PI * v;
+       l.sensor_cutoff = l.model.servo.sensor_cutoff = 2.0 * M_PI * v;
      }},
     {"frequency", "frequencies of the base, times their own", 0.0, 1000.0,
      [](Loop& l, const Loop& o, double v) {
@@ -148,7 +148,7 @@ int drawMap(const Experiment& e, const MapAxis& x, const MapAxis& y,
       x.parameter->set(loop, original, x.at(i, kPoints));
       const Loop half = loop;
       y.parameter->set(loop, y.parameter == x.parameter ? original : half, y.at(j, kPoints));
-      const Slowest s = slowest(loop);
+      const DominantRoot s = dominantRoot(loop);
       csv +=
           fmt::format("{},{},{},{}\n", x.at(i, kPoints), y.at(j, kPoints), s.growth, s.frequency);
       data += fmt::format("{} {} {}\n", x.at(i, kPoints), y.at(j, kPoints), s.growth);

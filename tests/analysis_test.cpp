@@ -99,7 +99,7 @@ TEST(AppendixE, LimitIsAMassRatioOfOne) {  // (E.14): no damping, sampled ever f
 TEST(AppendixE, MassRatiosAreThoseOfPhysicalSpace) {  // (E.18) against (E.20)
   const Experiment e = test::experiment("puma_on_table_4_1");
   const RigidBody robot = combine(RigidBody{}, e.plant.payload.X_PL0(),
-                                  locked(carried(e.plant.payload), e.plant.initial_joints));
+                                  compositeBody(carried(e.plant.payload), e.plant.initial_joints));
   Mat6 M = Mat6::Zero();
   M.diagonal() << 500, 500, 500, 250, 250, 250;
   VectorXd expected = (M.inverse() * spatialMass(robot)).eigenvalues().real();
@@ -149,8 +149,8 @@ TEST(LoopModel, GrowsAsTheWholeSimulationDoes) {
   int unstable = 0, compared = 0, off = 0;
   for (const Setting& setting : settings(count)) {
     Experiment e = test::experiment(setting.scenario, setting.set);
-    const Slowest s =
-        slowest(loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kSwinging));
+    const DominantRoot s =
+        dominantRoot(loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kSwinging));
     // Growth is watched from 0.06 to 0.25 m/s, below what makes the envelope slow it; a decay from
     // 30 mm, or 0.25 m/s, until few counts are left.
     const double fast = 2.0 * M_PI * s.frequency;  // [rad/s]
@@ -260,9 +260,9 @@ TEST(LoopModel, DelayOfATickIsALongerLag) {
   // oscillator with the wrench late by T.
   const Experiment e = test::experiment("srms_unberth_puma", {"base.keep_modes=1"});
   Loop loop = loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kExtending);
-  const double before = slowest(loop).growth;
+  const double before = dominantRoot(loop).growth;
   loop.delay = 1;
-  const Slowest after = slowest(loop);
+  const DominantRoot after = dominantRoot(loop);
   const double r = massRatios(loop.base, loop.robot_P)(0), w = 2 * M_PI * after.frequency;
   EXPECT_NEAR(before - after.growth, r * w * w * loop.period / (2 * (1 + r)),
               0.1 * std::abs(before));

@@ -11,8 +11,8 @@
 #include <iterator>
 
 #include "support/rig.hpp"
-#include "ves/report/series.hpp"
-#include "ves/report/summary.hpp"
+#include "ves/results/series.hpp"
+#include "ves/results/summary.hpp"
 #include "ves/run/run.hpp"
 
 namespace ves {
@@ -120,7 +120,7 @@ TEST_F(ClosedLoop, GravityCompensationLeavesQuantisationAndFilterLag) {
   const double weight = 9.81 * (52.45 + 16.0 + 5.0);
   const Vec3 weight_I(0.0, 0.0, -weight);
   // Quantisation: half an A/D count on each channel twice (reading and calibration), and half a
-  // Temposonics count on each leg, which tilts the believed gravity. Worst cases, added up.
+  // Temposonics count on each leg, which tilts the model gravity. Worst cases, added up.
   const double quantisation =
       e.controller.sensor.C_proc.topRows<3>().cwiseAbs().rowwise().sum().norm() +
       weight * 2 * 0.5 * e.plant.transducer.scale / 0.5;  // legs 0.5 m apart
@@ -285,7 +285,7 @@ TEST_F(ClosedLoop, WrenchOfASineIsLateByHoldServoAndFilters) {
       const double t = 0.01 * n++;
       if (t >= 10.0 / 3.0 - 1e-9 && t < 10.0 - 1e-9) {  // four whole swings
         force += state.dynamic.f.x() * std::exp(-s * t);
-        due += state.due(0) * std::exp(-s * t);
+        due += state.desired(0) * std::exp(-s * t);
       }
     }
     return Order();

@@ -15,7 +15,7 @@
 #include "ves/analysis/gate.hpp"
 #include "ves/config/servo.hpp"
 #include "ves/identification/servo_identification.hpp"
-#include "ves/report/comparison.hpp"
+#include "ves/results/comparison.hpp"
 #include "ves/run/run.hpp"
 
 namespace ves {
@@ -384,7 +384,7 @@ TEST_F(Emulation, LoopModelKnowsTheCompensation) {
   // another mass, or another servo gain, than there is.
   int stable = 0, unstable = 0;
   const auto compare = [&](const Experiment& e, const Loop& loop, const std::string& what) {
-    const Slowest s = slowest(loop);
+    const DominantRoot s = dominantRoot(loop);
     if (s.growth > -0.01 && s.growth < 0.8) return;  // twenty seconds do not tell
     (s.growth > 0.0 ? unstable : stable) += 1;
     EXPECT_EQ(runLockstep(e, nullptr, nullptr).good(), s.growth < 0.0)
@@ -432,7 +432,7 @@ TEST_F(Emulation, ComesInWithoutABump) {
   bool rising = false;
   for (const Row& row : series.rows) {
     if (row.state.engaged == 0) continue;
-    rising = rising || (row.state.compensated > 0.1 && row.state.compensated < 0.9);
+    rising = rising || (row.state.compensation_share > 0.1 && row.state.compensation_share < 0.9);
     for (int i = 0; i < 6; ++i)
       ASSERT_NEAR(row.truth.leg[i], series.rows.front().truth.leg[i], e.plant.transducer.scale);
   }
@@ -457,8 +457,8 @@ TEST_F(Emulation, GoesOutAndComesBackInTheMiddleOfASwing) {
     last = state.reference;
     if (since > 2 && since < 100) plain = std::max(plain, change);
     if (since > 100) jump = std::max(jump, change);
-    if (since > 200 && since < 300) least = std::min(least, state.compensated);
-    if (since > 400) most = state.compensated;
+    if (since > 200 && since < 300) least = std::min(least, state.compensation_share);
+    if (since > 400) most = state.compensation_share;
     if (since == 150) return {Request::kUncompensate, {}, {}};
     if (since == 300) return {Request::kCompensate, {}, {}};
     return {};
@@ -512,8 +512,10 @@ TEST_F(Emulation, StopEndsWhereTheLegsWereTold) {  // a freeze in the middle of 
 TEST(ServoIdentification, FindsWhatTheMachineIs) {
   for (const auto& [set, extend, retract, tau] :
        {std::tuple{"seed=1", 1.0, 1.0, 1.0},
-        std::tuple{"reality={gain_extend: 1.1, gain_retract: 0.92, tau: 1.3}", 1.1, 0.92, 1.3},
-        std::tuple{"reality={gain_extend: 0.85, gain_retract: 1.05, tau: 0.7}", 0.85, 1.05, 0.7}}) {
+        std::tuple{"plant_mismatch={gain_extend: 1.1, gain_retract: 0.92, tau: 1.3}", 1.1, 0.92,
+                   1.3},
+        std::tuple{"plant_mismatch={gain_extend: 0.85, gain_retract: 1.05, tau: 0.7}", 0.85, 1.05,
+                   0.7}}) {
     const Experiment e = experiment("servo_identification", {set});
     const ServoModel& nominal = e.controller.servo;
     LegRecord record;

@@ -508,13 +508,13 @@ TEST(TestPlatform, ArmsOnlyAfterAFreshStream) {
 TEST(TestPlatform, RefusesToArmBesideAnotherController) {
   Bench bench("z_sine");
   for (int i = 0; i < 50; ++i) {
-    bench.in().rival = i % 2 == 0;
+    bench.in().conflicting_node = i % 2 == 0;
     bench.tick();
   }
-  bench.in().rival = true;
+  bench.in().conflicting_node = true;
   const TickState& state = bench.tick();
   EXPECT_EQ(state.phase, Phase::kDisarmed);
-  EXPECT_TRUE(state.tripped.has(Check::kRival));
+  EXPECT_TRUE(state.tripped.has(Check::kConflictingNode));
 }
 
 TEST(TestPlatform, ComesHomeGentlyAndParks) {
@@ -562,7 +562,7 @@ TEST_P(Trips, LatchesAndHoldsTheLastCheckedLengths) {
   // The cause goes away; the stop stays.
   bench.in().sample.switches = kAllSwitchesClosed;
   bench.in().sample.q = bench.experimentUsed().plant.initial_joints;
-  bench.in().rival = false;
+  bench.in().conflicting_node = false;
   for (int i = 0; i < 100; ++i) {
     bench.in().sample.legs = last;
     EXPECT_EQ(bench.tick().command.counts, last);
@@ -581,7 +581,8 @@ INSTANTIATE_TEST_SUITE_P(
         Fault{"joint_angle_nan", Check::kFinite, [](TickInput& in) { in.sample.q(2) = kNan; }},
         Fault{"joint_angle_infinite", Check::kFinite,
               [](TickInput& in) { in.sample.q(0) = std::numeric_limits<double>::infinity(); }},
-        Fault{"second_controller", Check::kRival, [](TickInput& in) { in.rival = true; }}),
+        Fault{"second_controller", Check::kConflictingNode,
+              [](TickInput& in) { in.conflicting_node = true; }}),
     [](const auto& test) { return std::string(test.param.name); });
 
 struct Crossing {

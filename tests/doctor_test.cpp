@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // What the doctor makes of what it measures.
-#include "ves/run/doctor.hpp"
+#include "ves/doctor/doctor.hpp"
 
 #include <gtest/gtest.h>
 

@@ -164,17 +164,17 @@ TEST(PosePlan, IsBetterThanChanceAndInsideTheLimits) {
 }
 
 /// Rests as the machine gives them: legs read in counts, a noisy, biased, drifting sensor.
-std::vector<Rest> readings(const Experiment& e, const StaticSetup& setup, const PosePlan& plan,
-                           std::uint32_t seed) {
+std::vector<StaticInterval> readings(const Experiment& e, const StaticSetup& setup,
+                                     const PosePlan& plan, std::uint32_t seed) {
   constexpr int kSettling = 40, kReadings = 120;
   plant::ForceTorqueSensor sensor(e.plant.sensor, plant::Noise(seed));
   const auto step = sensor.prepare(0.01);
   std::mt19937 draw(seed);
   std::uniform_real_distribution<double> u(-0.5, 0.5);
-  std::vector<Rest> rests;
+  std::vector<StaticInterval> rests;
   for (const PosePlan::Attitude& a : plan.attitudes)
     for (const JointVector& q : a.q) {
-      Rest rest;
+      StaticInterval rest;
       rest.t = 10.0 * static_cast<double>(rests.size());
       rest.q = q;
       const Transform X_IP = e.controller.geometry.fromHome({Vec3::Zero(), a.rpy});
@@ -241,8 +241,9 @@ TEST(Identification, RefusesWhatCannotTell) {
   const Experiment e = test::experiment("puma_on_table_4_1");
   const StaticSetup setup = staticSetup(e.controller);
   const SeparableCombinations c = separableCombinations(setup.robot);
-  EXPECT_THROW(estimateMasses(setup, c, std::vector<Rest>(3)), std::domain_error);
-  EXPECT_THROW(estimateMasses(setup, c, std::vector<Rest>(100)), std::domain_error);  // one pose
+  EXPECT_THROW(estimateMasses(setup, c, std::vector<StaticInterval>(3)), std::domain_error);
+  EXPECT_THROW(estimateMasses(setup, c, std::vector<StaticInterval>(100)),
+               std::domain_error);  // one pose
 }
 
 // --- Kuklinski's compensation --------------------------------------------------------------------

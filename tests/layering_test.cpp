@@ -18,40 +18,35 @@ using Names = std::set<std::string>;
 const fs::path kRoot = VES_TEST_SOURCE_DIR;
 
 /// What a module may include beside itself.
-const std::map<std::string, Names> kMayInclude = {
-    {"base", {}},
-    {"math", {}},
-    {"kinematics", {"math"}},
-    {"robot", {"math"}},
-    {"control", {"math", "kinematics", "robot"}},
-    {"plant", {"math", "kinematics", "robot", "control"}},
-    {"simulation", {"math", "kinematics", "robot", "control", "plant"}},
-    {"srms", {"math", "robot", "control"}},
-    {"analysis", {"math", "robot", "control", "plant"}},
-    {"config", {"base", "math", "kinematics", "robot", "control", "plant", "srms", "analysis"}},
-    {"identification", {"base", "math", "kinematics", "robot", "control", "plant", "config"}},
-    {"realtime", {"base"}},
-    {"transport",
-     {"base", "math", "kinematics", "robot", "control", "plant", "simulation", "config"}},
-    {"run",
-     {"base", "simulation", "math", "kinematics", "robot", "control", "plant", "config",
-      "transport", "realtime"}},
-    {"replay",
-     {"base", "math", "kinematics", "robot", "control", "plant", "analysis", "config", "transport",
-      "realtime"}},
-    {"report",
-     {"base", "math", "kinematics", "robot", "control", "plant", "srms", "analysis", "config",
-      "identification", "transport", "realtime", "run"}},
-    {"sweep",
-     {"base", "math", "kinematics", "robot", "control", "plant", "analysis", "config", "transport",
-      "realtime", "run", "report"}},
-    {"faults",
-     {"base", "simulation", "math", "kinematics", "robot", "control", "plant", "config",
-      "transport", "realtime", "run"}},
-    {"console",
-     {"base", "math", "kinematics", "robot", "control", "plant", "config", "transport", "realtime",
-      "run", "report"}},
-};
+const std::map<std::string, Names> kMayInclude = [] {
+  std::map<std::string, Names> may = {{"base", {}}, {"math", {}}};
+  const auto add = [&](const std::string& module, const Names& more, const std::string& below) {
+    may[module] = more;
+    if (!below.empty()) {
+      may[module].insert(below);
+      may[module].insert(may[below].begin(), may[below].end());
+    }
+  };
+  add("kinematics", {}, "math");
+  add("robot", {}, "math");
+  add("control", {"robot"}, "kinematics");
+  add("plant", {}, "control");
+  add("simulation", {}, "plant");
+  add("srms", {}, "control");
+  add("analysis", {"base"}, "plant");
+  add("config", {"srms"}, "analysis");
+  add("identification", {}, "config");
+  add("realtime", {}, "base");
+  add("transport", {"simulation"}, "config");
+  add("run", {"realtime"}, "transport");
+  add("results", {"identification"}, "run");
+  add("validation", {}, "results");
+  add("doctor", {}, "run");
+  add("sweep", {}, "results");
+  add("faults", {}, "run");
+  add("console", {}, "results");
+  return may;
+}();
 
 const Names kPure = {"math", "kinematics", "robot", "control"};
 

@@ -11,7 +11,7 @@
 #include "support/refusal.hpp"
 #include "support/rig.hpp"
 #include "support/robots.hpp"
-#include "ves/replay/replay.hpp"
+#include "ves/run/replay.hpp"
 #include "ves/run/run.hpp"
 #include "ves/transport/channels.hpp"
 
@@ -163,7 +163,7 @@ TEST(Orders, ARefusedCalibrationOfBeforeDoesNotEndALaterProgram) {
     return s.phase == Phase::kReturning;
   });
   EXPECT_EQ(last, e.controller.program.size - 1);
-  EXPECT_FALSE(rig.state().cut_short);
+  EXPECT_FALSE(rig.state().aborted);
 }
 
 TEST(Orders, AWatchInRealTimeIsNoOverrun) {
@@ -172,7 +172,7 @@ TEST(Orders, AWatchInRealTimeIsNoOverrun) {
   rig.arm();
   rig.tick(Request::kRun, sine(2, 0.1, 0.5, 2.0));
   rig.until(Phase::kArmed);
-  Segment watch = segment(SegmentKind::kWatch, 20.0);
+  Segment watch = segment(SegmentKind::kMonitor, 20.0);
   watch.interval = 60.0;
   rig.tick(Request::kRun, watch);
   for (int i = 0; i < 500; ++i) {
@@ -215,7 +215,7 @@ INSTANTIATE_TEST_SUITE_P(Loads, CalibrationOf,
 struct Restless {
   const char* name;
   const char* set;
-  Unrest unrest;
+  StillnessViolation violation;
   int index;
   void (*before)(Rig&);
 };
@@ -230,26 +230,26 @@ TEST_P(CalibrationIsRefused, WithTheEvidence) {
   const Vec6 bias = rig.tick(Request::kRun, segment(SegmentKind::kCalibration)).bias;
   const TickState& s = rig.until(Phase::kArmed);
   EXPECT_EQ(s.calibration, Calibration::Status::kRefused);
-  EXPECT_EQ(s.unrest, GetParam().unrest);
-  EXPECT_EQ(s.unrest_index, GetParam().index);
-  EXPECT_GT(s.unrest_amount, 0.0);
+  EXPECT_EQ(s.violation, GetParam().violation);
+  EXPECT_EQ(s.violation_index, GetParam().index);
+  EXPECT_GT(s.violation_amount, 0.0);
   EXPECT_EQ(s.bias, bias);
 }
 
 INSTANTIATE_TEST_SUITE_P(
     Causes, CalibrationIsRefused,
-    testing::Values(Restless{"robot_moves", "seed=1", Unrest::kJoint, 1,
+    testing::Values(Restless{"robot_moves", "seed=1", StillnessViolation::kJoint, 1,
                              [](Rig& rig) {
                                rig.plant().moveRobot({1, 0.0, 30.0});
                                rig.run(300);
                              }},
-                    Restless{"leg_creeps", "seed=1", Unrest::kLeg, 4,
+                    Restless{"leg_creeps", "seed=1", StillnessViolation::kLeg, 4,
                              [](Rig& rig) {
                                rig.disturb([n = 0](Sample& s) mutable { s.legs[4] += ++n / 20; });
                              }},
                     Restless{"something_shakes_it",
                              "sensor.noise_v_per_root_hz=[3.7e-7,3.7e-7,4e-6,3.7e-7,3.7e-7,3.7e-7]",
-                             Unrest::kChannel, 2, [](Rig&) {}}),
+                             StillnessViolation::kChannel, 2, [](Rig&) {}}),
     [](const auto& test) { return std::string(test.param.name); });
 
 TEST(Calibration, WaitsForTheRobotToComeToRest) {
@@ -260,7 +260,7 @@ TEST(Calibration, WaitsForTheRobotToComeToRest) {
   rig.tick(Request::kRun, segment(SegmentKind::kCalibration));
   const TickState& s = rig.until(Phase::kArmed);
   EXPECT_EQ(s.calibration, Calibration::Status::kDone);
-  EXPECT_EQ(s.unrest, Unrest::kJoint);
+  EXPECT_EQ(s.violation, StillnessViolation::kJoint);
   EXPECT_LT((s.bias - trueBias(e)).cwiseQuotient(s.standard_error).cwiseAbs().maxCoeff(), 8.0);
 }
 
@@ -268,7 +268,7 @@ TEST(Calibration, WhenRefusedEndsTheProgramAtHome) {
   const Experiment e = experiment("puma_on_table_4_1", {"controller.still.deviation_counts=0.001"});
   const RunResult result = runLockstep(e, nullptr, nullptr);
   EXPECT_EQ(result.phase, Phase::kParked);
-  EXPECT_TRUE(result.cut_short);
+  EXPECT_TRUE(result.aborted);
   EXPECT_FALSE(result.good());
   EXPECT_LT(result.ticks, 1000);  // no admittance segment of 14 s
 }
@@ -373,19 +373,19 @@ TEST(Orders, AreInTheLogAndReplayExactly) {
 TEST(Watch, SixtyFiveHoursFollowTheTemperature) {
   // 4.1.2: a bias of drift times the temperature beside it; 131 looks, 30 minutes apart.
   const Experiment e = experiment("sensor_drift");
-  struct Look {
+  struct DriftSample {
     double t = 0.0, n = 0.0;
     Vec6 mean = Vec6::Zero();
   };
-  std::vector<Look> looks;
+  std::vector<DriftSample> looks;
   const double period = 0.01;
   std::int64_t begun = -1;
   const RunResult result = runLockstep(e, nullptr, [&](const TickState& s) {
-    if (s.kind != SegmentKind::kWatch) return Order();
+    if (s.kind != SegmentKind::kMonitor) return Order();
     if (begun < 0) begun = s.tick;
     const auto look = static_cast<std::size_t>((s.tick - begun) / 180'000);
     if (looks.size() <= look) looks.resize(look + 1);
-    Look& l = looks[look];
+    DriftSample& l = looks[look];
     l.n += 1.0;
     l.t += (static_cast<double>(s.tick) * period - l.t) / l.n;
     l.mean += (s.dynamic.stacked() - l.mean) / l.n;
@@ -396,7 +396,7 @@ TEST(Watch, SixtyFiveHoursFollowTheTemperature) {
   ASSERT_EQ(looks.size(), 131u);
   const Mat6 C = e.controller.sensor.C_proc;
   const double t0 = looks[0].t;
-  for (const Look& l : looks) {
+  for (const DriftSample& l : looks) {
     EXPECT_EQ(l.n, 100.0);
     const auto warmer = [](double t) { return 1.25 * std::sin(2.0 * M_PI * t / 86400.0); };
     const Vec6 counts = e.plant.sensor.drift / e.plant.sensor.volts_per_count * warmer(l.t);

@@ -309,12 +309,12 @@ TEST(Plant, PlatesCountedIntoTheRobotsBaseWeighTheSame) {
     };
     const Wrench oracle =
         part(load.X_PL0(), newtonEuler(load.robot, truth.joints,
-                                       feltMotion(truth.P, load.X_PL0(), e.plant.gravity))
+                                       properMotion(truth.P, load.X_PL0(), e.plant.gravity))
                                .F_L0o_L0) +
         part(load.X_PR,
-             inertialWrench(load.adapter_R, feltMotion(truth.P, load.X_PR, e.plant.gravity))) +
+             inertialWrench(load.adapter_R, properMotion(truth.P, load.X_PR, e.plant.gravity))) +
         part(load.X_PS,
-             inertialWrench(load.top_plate_S, feltMotion(truth.P, load.X_PS, e.plant.gravity)));
+             inertialWrench(load.top_plate_S, properMotion(truth.P, load.X_PS, e.plant.gravity)));
     ASSERT_LT((truth.F_Po_I - oracle).stacked().norm(), 1e-9);
   }
 }

@@ -6,7 +6,7 @@
 
 #include "support/refusal.hpp"
 #include "support/rig.hpp"
-#include "ves/replay/replay.hpp"
+#include "ves/run/replay.hpp"
 #include "ves/run/run.hpp"
 #include "ves/transport/channels.hpp"
 

@@ -7,10 +7,10 @@
 
 #include "support/rig.hpp"
 #include "ves/analysis/loop.hpp"
-#include "ves/report/chapter4.hpp"
-#include "ves/report/comparison.hpp"
-#include "ves/report/page.hpp"
+#include "ves/results/comparison.hpp"
 #include "ves/run/run.hpp"
+#include "ves/validation/chapter4.hpp"
+#include "ves/validation/page.hpp"
 
 namespace ves {
 namespace {
@@ -25,7 +25,7 @@ Interaction interaction(const std::string& scenario, const std::vector<std::stri
 TEST(CoupledModes, AreTheRootsOfBaseAndRobotTogether) {
   const Interaction i = interaction("srms_capture_doss", {"base.keep_modes=6"});
   const Eigen::MatrixXd A = augmentedModalMass(
-      i.base, combine(RigidBody{}, i.payload.X_PL0(), locked(carried(i.payload), i.q0)));
+      i.base, combine(RigidBody{}, i.payload.X_PL0(), compositeBody(carried(i.payload), i.q0)));
   Eigen::MatrixXd S = Eigen::MatrixXd::Zero(12, 12);
   S.topRightCorner(6, 6).setIdentity();
   S.bottomLeftCorner(6, 6) = -A.inverse() * Eigen::MatrixXd(i.base.stiffness.asDiagonal());
@@ -87,8 +87,10 @@ TEST(VesOnTheArm, RingsDownAsTheModelOfItsLoopSays) {
     const RingDown fit = ringDown(commanded(seriesOf(e)), softest_mode);
     const double decay = fit.damping_ratio * 2 * M_PI * fit.frequency;
     const JointVector& q = e.plant.initial_joints;
-    const double slow = -slowest(loopOf(e.controller, e.plant, q, Direction::kExtending)).growth;
-    const double fast = -slowest(loopOf(e.controller, e.plant, q, Direction::kRetracting)).growth;
+    const double slow =
+        -dominantRoot(loopOf(e.controller, e.plant, q, Direction::kExtending)).growth;
+    const double fast =
+        -dominantRoot(loopOf(e.controller, e.plant, q, Direction::kRetracting)).growth;
     EXPECT_GT(decay, 0.95 * slow) << filters;
     EXPECT_LT(decay, 1.05 * fast) << filters;
   }
@@ -194,25 +196,40 @@ TEST(Figure, ThinningKeepsThePeakOfALongLine) {
 TEST(Chapter4, EveryClaimHasItsVerdict) {
   const fs::path folder = fs::temp_directory_path() / ("ves_chapter4_" + std::to_string(getpid()));
   fs::create_directories(folder);
-  double done = 0.0;
-  const Chapter4 chapter =
-      reproduceChapter4(test::configDir(), folder, [&](const std::string&, double now) {
-        EXPECT_GE(now, done);
-        EXPECT_LT(now, 1.0);
-        done = now;
-      });
-  EXPECT_GT(done, 0.98);
+  int runs_told = 0;
+  const Chapter4 chapter = reproduceChapter4(
+      test::configDir(), folder, [&](const std::string&, int run) { EXPECT_EQ(run, ++runs_told); });
+  EXPECT_GT(runs_told, 200);
   EXPECT_TRUE(fs::is_empty(folder));
   fs::remove_all(folder);
   expectBalanced(chapter.html);
   EXPECT_EQ(chapter.html.find("could not draw"), std::string::npos);
   EXPECT_EQ(chapter.html.find("nan"), std::string::npos);
 
-  std::map<std::string, int> verdicts;
-  for (const auto& claim : chapter.summary["claims"]) ++verdicts[claim["verdict"]];
-  EXPECT_EQ(verdicts["agrees"], 8);
-  EXPECT_EQ(verdicts["differs"], 1);
-  EXPECT_EQ(verdicts["not shown"], 0);
+  // The verdicts that README and the guides speak of; config/claims.yaml has the ranges.
+  const std::map<std::string, std::string> expected = {
+      {"4.1.1, figure 4.1", "agrees"},
+      {"4.1.2, figures 4.2 and 4.3", "cannot be judged"},
+      {"2.4", "agrees"},
+      {"4.2.1, figures 4.4 and 4.5", "agrees"},
+      {"4.2.1, figure 4.5", "cannot be judged"},
+      {"4.2.1, figures 4.6 and 4.7", "cannot be judged"},
+      {"4.2.2, figures 4.8 to 4.10", "cannot be judged"},
+      {"4.3, figures 4.11 to 4.18", "differs"},
+      {"4.3, figures 4.19 to 4.26", "cannot be judged"},
+      {"4.3", "agrees"},
+      {"5", "cannot be judged"},
+      {"E, figure E.4", "agrees"},
+      {"E.18 to E.20", "cannot be judged"},
+      {"B", "agrees"}};
+  int judged = 0;
+  for (const auto& claim : chapter.summary["claims"]) {
+    const std::string where = claim["where"];
+    ++judged;
+    EXPECT_EQ(claim["verdict"], where == "2.3" ? "agrees" : expected.at(where))
+        << where << ": " << claim["reached"];
+  }
+  EXPECT_EQ(judged, static_cast<int>(expected.size()) + 2);  // 2.3 makes two
   const auto& srms = chapter.summary["srms"];
   int runs = 0;
   for (const auto& [name, value] : srms.items()) {

@@ -66,7 +66,7 @@ TEST_P(MovingBase, WrenchIsTheRateOfMomentum) {  // Appendix A with link 0 and a
 
       const BodyMotion P = base.motion(t);
       const Wrench F_L0o_L0 =
-          newtonEuler(robot, jointSwing(robot.joints, t), feltMotion(P, X_PL0, Vec3::Zero()))
+          newtonEuler(robot, jointSwing(robot.joints, t), properMotion(P, X_PL0, Vec3::Zero()))
               .F_L0o_L0;
       const Wrench F_Io_I = transfer(P.X * X_PL0, F_L0o_L0);
       ASSERT_LT((F_Io_I.stacked() - rate).norm(), 1e-6 * (1.0 + rate.norm()));
@@ -81,8 +81,8 @@ TEST_P(MovingBase, GravityIsAnUpwardAcceleration) {
   const BodyMotion P = base.motion(0.7);
   const Vec3 g_I(0.0, 0.0, -kG);
   const JointState q = jointSwing(robot.joints, 0.7);
-  const Wrench with = newtonEuler(robot, q, feltMotion(P, {}, g_I)).F_L0o_L0;
-  const Wrench without = newtonEuler(robot, q, feltMotion(P, {}, Vec3::Zero())).F_L0o_L0;
+  const Wrench with = newtonEuler(robot, q, properMotion(P, {}, g_I)).F_L0o_L0;
+  const Wrench without = newtonEuler(robot, q, properMotion(P, {}, Vec3::Zero())).F_L0o_L0;
   const Vec3 extra = P.X.R * (with.f - without.f);
   EXPECT_LT((extra + totalMass(robot) * g_I).norm(), 1e-9);
 }
@@ -100,7 +100,7 @@ TEST_P(JointEfforts, EqualKdlOnAFixedBase) {
   KDL::ChainIdSolver_RNE solver(chain, KDL::Vector(0, 0, -kG));
   std::mt19937 random(7);
   std::uniform_real_distribution<double> u(-3.0, 3.0);
-  FeltMotion base;
+  ProperMotion base;
   base.a = {0.0, 0.0, kG};
   for (int k = 0; k < 1000; ++k) {
     KDL::JntArray q(n), qd(n), qdd(n), tau(n);
@@ -149,7 +149,7 @@ struct PumaGravity {
 
 TEST(Puma, GravityTorquesAreTheClosedForm) {
   const RobotModel robot = test::robot("puma560").model;
-  FeltMotion base;
+  ProperMotion base;
   base.a = {0.0, 0.0, kG};
   std::mt19937 random(9);
   std::uniform_real_distribution<double> u(-3.0, 3.0);
@@ -167,7 +167,7 @@ TEST(Puma, WeighsWhatItsTableSays) {
   // Base moment of links 1 to 6 about frame 0 in the ready pose, added up by hand.
   RobotModel moving = robot;
   moving.base = {};
-  FeltMotion base;
+  ProperMotion base;
   base.a = {0.0, 0.0, kG};
   JointState ready;
   ready.q.head<3>() << 0.0, -90 * kDegree, 90 * kDegree;

@@ -206,8 +206,8 @@ TEST(Safety, CalibrationRefusesAnUnknownLoad) {
   rig.tick(Request::kRun, segment(SegmentKind::kCalibration));
   rig.until(Phase::kArmed);
   EXPECT_EQ(rig.state().calibration, Calibration::Status::kRefused);
-  EXPECT_EQ(rig.state().unrest, Unrest::kBias);
-  EXPECT_EQ(rig.state().unrest_index, 2);
+  EXPECT_EQ(rig.state().violation, StillnessViolation::kBias);
+  EXPECT_EQ(rig.state().violation_index, 2);
 }
 
 // --- Time ----------------------------------------------------------------------------------------
@@ -276,17 +276,17 @@ TEST(Safety, AdmittanceRunPushedAgainstItsLimitsComesToRestInside) {
         s.adc[static_cast<std::size_t>(i)] += static_cast<int>(std::lround(counts(i)));
     });
     Vec6 last = rig.state().motion.x_dot;
-    bool slowed = false;
+    bool envelope_scale = false;
     for (int i = 0; i < 1500; ++i) {
       ASSERT_EQ(rig.tick().phase, Phase::kRunning) << name(rig.state().cause) << " in " << i;
-      slowed = slowed || rig.state().slowed < 1.0;
+      envelope_scale = envelope_scale || rig.state().envelope_scale < 1.0;
       // The envelope brakes gently: no jerk into the wall.
       const Vec6 change = rig.state().motion.x_dot - last;
       EXPECT_LT(change.head<3>().norm(),
                 3.0 * e.controller.gentle.braking.translation * 0.01 + 0.1);
       last = rig.state().motion.x_dot;
     }
-    EXPECT_TRUE(slowed);
+    EXPECT_TRUE(envelope_scale);
     EXPECT_LT(rig.state().motion.x_dot.norm(), 1e-3);  // at rest
     const Vec6 wall = rig.state().motion.x;
     EXPECT_TRUE(motionLimitsCheck(e.controller.safety, Pose::from(wall)));
@@ -304,7 +304,7 @@ TEST(Safety, TheEnvelopeLeavesAFreeRunAlone) {
   rig.run(20);
   rig.tick(Request::kStart);
   rig.until([](const TickState& s) {
-    EXPECT_EQ(s.slowed, 1.0);
+    EXPECT_EQ(s.envelope_scale, 1.0);
     return s.phase == Phase::kParked;
   });
   EXPECT_EQ(rig.state().phase, Phase::kParked);

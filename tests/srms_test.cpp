@@ -206,7 +206,7 @@ Interaction interaction(const std::string& scenario, const std::vector<std::stri
 }
 
 RigidBody lockedInP(const Interaction& i, const JointVector& q) {
-  return combine(RigidBody{}, i.payload.X_PL0(), locked(carried(i.payload), q));
+  return combine(RigidBody{}, i.payload.X_PL0(), compositeBody(carried(i.payload), q));
 }
 
 TEST(Interaction, AugmentedMassIsTheModalMassOfBaseAndRobot) {  // (3.11)
@@ -221,7 +221,7 @@ TEST(Interaction, AugmentedMassIsTheModalMassOfBaseAndRobot) {  // (3.11)
 double energy(const Interaction& i, const InteractionPoint& p, const RigidBody& robot_P,
               const Mat3& R_IP) {
   const Vec6 twist = i.base.Phi * p.eta_dot;
-  const Mat6 M = spatialMass(turned(R_IP, robot_P));
+  const Mat6 M = spatialMass(rotated(R_IP, robot_P));
   return 0.5 *
          (p.eta_dot.squaredNorm() + i.base.stiffness.dot(p.eta.cwiseAbs2()) + twist.dot(M * twist));
 }

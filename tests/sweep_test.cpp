@@ -99,7 +99,7 @@ class Sweep : public test::Programs {
   static constexpr const char* kRuns =
       "free_decay --set 'program=[{calibration: {}},{move: {to: {x_m: 0.01}}},"
       "{admittance: {duration_s: 1}}]' "
-      "--vary legs.tau_s=0.005,0.0064,0.008 --draw reality.gain_extend=0.95:1.05 --runs 4 ";
+      "--vary legs.tau_s=0.005,0.0064,0.008 --draw plant_mismatch.gain_extend=0.95:1.05 --runs 4 ";
   test::Output sweep(const std::string& arguments) { return test::sh(app("sweep") + arguments); }
   std::string csv(const std::string& folder) {
     return test::readText((folder_ / folder / "sweep.csv").string());

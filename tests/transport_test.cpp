@@ -246,10 +246,10 @@ TEST_F(PrivateBus, ControllerKeepsTheNewestSampleOfTheNewestPlant) {
   machine.publish(channel::kSample, broken);
   settle(machine, controller, [&] { return link.rejected() == 3; });
   EXPECT_EQ(link.sample().sequence, 5);
-  link.takeRival();
+  link.takeConflict();
   send(0, 200);  // the plant was started anew
   settle(machine, controller, [&] { return link.sample().sequence == 0; });
-  EXPECT_FALSE(link.takeRival());
+  EXPECT_FALSE(link.takeConflict());
 
   leg_command_t engaged = toMessage(LegCommand{}, header({9, 9}, 0, 0));
   engaged.engaged = 1;
@@ -257,7 +257,7 @@ TEST_F(PrivateBus, ControllerKeepsTheNewestSampleOfTheNewestPlant) {
   send(77, 300);  // another machine, while we have the legs of this one
   settle(machine, controller, [&] { return link.rejected() == 4; });
   EXPECT_EQ(link.sample().sequence, 0);
-  EXPECT_TRUE(link.takeRival());
+  EXPECT_TRUE(link.takeConflict());
 }
 
 TEST_F(PrivateBus, OneControllerHasTheLegs) {
@@ -291,9 +291,9 @@ TEST_F(PrivateBus, OneControllerHasTheLegs) {
   send(2, 2, true);  // the first is silent
   EXPECT_EQ(taken(), 2000);
   for (int i = 0; i < 20; ++i) bus.wait(10);
-  EXPECT_TRUE(first.takeRival());
-  EXPECT_TRUE(second.takeRival());
-  EXPECT_FALSE(first.takeRival());
+  EXPECT_TRUE(first.takeConflict());
+  EXPECT_TRUE(second.takeConflict());
+  EXPECT_FALSE(first.takeConflict());
 }
 
 TEST_F(PrivateBus, RandomBytesOnEveryChannelAreNobodys) {

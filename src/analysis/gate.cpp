@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/analysis/gate.hpp"
+#include "ves/base/coordinates.hpp"
 
 #include <fmt/format.h>
 
@@ -28,7 +29,7 @@ bool holds(const ControllerConfig& controller, const plant::PlantConfig& plant,
 }  // namespace
 
 std::vector<JointVector> programPoses(const Program& program, const plant::PlantConfig& plant) {
-  constexpr int kLooks = 12;  // [-] along each motion
+  constexpr int kInstants = 12;  // [-] along each motion
   const auto felt = [&](int i) {
     return i < program.size &&
            program.segments[static_cast<std::size_t>(i)].kind == SegmentKind::kAdmittance;
@@ -38,18 +39,18 @@ std::vector<JointVector> programPoses(const Program& program, const plant::Plant
   for (int i = 0; i < program.size; ++i) {
     if (felt(i) && at != out.back()) out.push_back(at);
     std::vector<plant::RobotEvent> events;
-    std::set<std::int64_t> looks;  // [ns]
+    std::set<std::int64_t> instants;  // [ns]
     for (const plant::RobotEvent& event : plant.robot_events) {
       if (event.cue.segment != i) continue;
       events.push_back(event);
-      for (int k = 0; k <= kLooks; ++k)
-        looks.insert(event.cue.after + std::llround(event.move.duration * 1e9 * k / kLooks));
+      for (int k = 0; k <= kInstants; ++k)
+        instants.insert(event.cue.after + std::llround(event.move.duration * 1e9 * k / kInstants));
     }
     std::stable_sort(events.begin(), events.end(),
                      [](const auto& a, const auto& b) { return a.cue.after < b.cue.after; });
     JointPaths paths(kMaxJoints, at);
     auto next = events.begin();
-    for (const std::int64_t now : looks) {
+    for (const std::int64_t now : instants) {
       for (; next != events.end() && next->cue.after <= now; ++next)
         paths.move(next->move, next->cue.after);
       at = paths.at(now).q;
@@ -86,7 +87,7 @@ LoopVerdict assessStability(const ControllerConfig& controller, const plant::Pla
     out.direction = direction;
   }
   if (!cures) return out;
-  out.worst = slowest(out.direction == Direction::kExtending ? out.extending : out.retracting);
+  out.worst = dominantRoot(out.direction == Direction::kExtending ? out.extending : out.retracting);
   if (out.stable) return out;
 
   const auto cured = [&](const auto& change) { return holds(controller, plant, poses, change); };
@@ -106,7 +107,6 @@ LoopVerdict assessStability(const ControllerConfig& controller, const plant::Pla
 }
 
 std::string explain(const LoopVerdict& v) {
-  static constexpr const char* kCoordinate[] = {"x", "y", "z", "alpha", "beta", "gamma"};
   Eigen::Index i = 0;
   v.worst.shape.cwiseAbs().maxCoeff(&i);
   std::string cure;
@@ -119,7 +119,7 @@ std::string explain(const LoopVerdict& v) {
   return fmt::format(
       "the loop of base, robot and machine would diverge: {:.2f} Hz, most in {}, doubling every "
       "{:.2g} s (legs {}). What cures it: {}",
-      v.worst.frequency, kCoordinate[i], std::log(2.0) / v.worst.growth,
+      v.worst.frequency, coordinate(i).name, std::log(2.0) / v.worst.growth,
       v.direction == Direction::kExtending ? "extending" : "retracting", cure);
 }
 

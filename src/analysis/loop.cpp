@@ -129,7 +129,7 @@ Channel channelOf(const Loop& loop) {
 /// {length, speed, v_end, sensor (2)}; a reading replaces the length at every tick.
 Channel observerOf(const Loop& loop) {
   constexpr Index kLength = 0, kSpeed = 1, kHeld = 2, kSensor = 3, kSize = 5, kCommand = kSize;
-  const ServoModel& servo = loop.believed.servo;
+  const ServoModel& servo = loop.model.servo;
   const double w = servo.sensor_cutoff, tau = servo.tau(0), K = servo.extend(0);
   const int updates = std::max(1, static_cast<int>(std::lround(loop.period / servo.update)));
   const double h = loop.period / updates;
@@ -157,7 +157,7 @@ Channel observerOf(const Loop& loop) {
 /// The whole loop over a period, of {eta, eta', six channels, six servo models where the inertia is
 /// taken out, six late wrenches a tick of delay}.
 MatrixXd systemOf(const Loop& loop) {
-  const Loop::Believed& own = loop.believed;
+  const Loop::Model& own = loop.model;
   const Channel channel = channelOf(loop);
   const Channel model = own.inertia ? observerOf(loop) : Channel{};
   const Index n = channel.step.rows(), m = model.step.rows(), k = loop.base.stiffness.size(),
@@ -241,8 +241,8 @@ Loop loopOf(const ControllerConfig& controller, const plant::PlantConfig& p, con
             Direction direction) {
   Loop loop;
   loop.base = controller.admittance;
-  loop.robot_P =
-      combine(RigidBody{}, controller.payload.X_PL0(), locked(carried(controller.payload), q));
+  loop.robot_P = combine(RigidBody{}, controller.payload.X_PL0(),
+                         compositeBody(carried(controller.payload), q));
   loop.period = static_cast<double>(controller.period) * kSecondPerNanosecond;
   const double extend = p.actuator.gain_extend, retract = p.actuator.gain_retract;
   double K = 2.0 * extend * retract / (extend + retract);
@@ -254,14 +254,14 @@ Loop loopOf(const ControllerConfig& controller, const plant::PlantConfig& p, con
   loop.filter_cutoff = p.filters == plant::LegFilters::kOutputs ? p.filter_cutoff : 0.0;
   loop.sensor_cutoff = p.sensor.cutoff;
 
-  Loop::Believed& own = loop.believed;
+  Loop::Model& own = loop.model;
   own = {controller.compensation.feed_forward, controller.compensation.inertia, loop.robot_P,
          controller.servo};
   const double up = own.servo.extend.mean(), down = own.servo.retract.mean();
-  double believed = 2.0 * up * down / (up + down);
-  if (direction == Direction::kExtending) believed = up;
-  if (direction == Direction::kRetracting) believed = down;
-  own.setGain(believed);
+  double model = 2.0 * up * down / (up + down);
+  if (direction == Direction::kExtending) model = up;
+  if (direction == Direction::kRetracting) model = down;
+  own.setGain(model);
   own.servo.tau.setConstant(own.servo.tau.mean());
   own.servo.delay.setConstant(own.servo.delay.mean());
   own.servo.rail = HUGE_VAL;
@@ -281,10 +281,10 @@ bool decays(const Loop& loop) {
 
 double radius(const Loop& loop) { return std::abs(largestRoot(systemOf(loop))); }
 
-Slowest slowest(const Loop& loop) {
+DominantRoot dominantRoot(const Loop& loop) {
   const MatrixXd S = systemOf(loop);
   const std::complex<double> root = largestRoot(S);
-  Slowest out;
+  DominantRoot out;
   out.radius = std::abs(root);
   out.growth = std::log(out.radius) / loop.period;
   out.frequency = std::abs(std::arg(root)) / (2.0 * M_PI * loop.period);

@@ -214,7 +214,7 @@ Base readBase(Section s) {
 
 Base loadBase(const std::filesystem::path& file, const std::vector<std::string>& overrides) {
   Value document = loadDocument(file);
-  for (const std::string& assignment : overrides) override(document, assignment);
+  for (const std::string& assignment : overrides) applyOverride(document, assignment);
   return readBase(Section(document, ""));
 }
 

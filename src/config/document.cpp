@@ -243,7 +243,7 @@ Value parseDocument(const std::string& text, const std::string& name) {
   return value;
 }
 
-void override(Value& document, const std::string& assignment) {
+void applyOverride(Value& document, const std::string& assignment) {
   const std::size_t equals = assignment.find('=');
   if (equals == std::string::npos || equals == 0)
     throw InputError(fmt::format("--set {}: want key.path=value", assignment));

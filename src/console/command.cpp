@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/console/command.hpp"
+#include "ves/base/coordinates.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -12,7 +13,6 @@
 namespace ves {
 namespace {
 
-constexpr const char* kCoordinate[] = {"x", "y", "z", "alpha", "beta", "gamma"};
 constexpr double kMillimetre = 1e-3;  // [m]
 constexpr double kLongest = 1e5;      // [s] of anything
 constexpr double kFastest = 50.0;     // [Hz] of a sine
@@ -50,17 +50,20 @@ class Words {
   std::size_t next_ = 0;
 };
 
-int coordinate(const std::string& word) {
-  for (int i = 0; i < 6; ++i)
-    if (word == kCoordinate[i]) return i;
-  throw InputError(fmt::format("'{}', want one of {}", word, fmt::join(kCoordinate, ", ")));
+int coordinateNamed(const std::string& word) {
+  std::string names;
+  for (int i = 0; i < 6; ++i) {
+    if (word == coordinate(i).name) return i;
+    names += fmt::format("{}{}", i ? ", " : "", coordinate(i).name);
+  }
+  throw InputError(fmt::format("'{}', want one of {}", word, names));
 }
 
 /// A length or an angle within the workspace, in SI.
 double within(Words& words, const std::string& what, int i, const SafetyLimits& limits) {
-  const double unit = i < 3 ? kMillimetre : kDegree;
-  const double reach = (i < 3 ? limits.translation : limits.rotation) / unit;
-  return words.number(what, -reach, reach, i < 3 ? "mm" : "deg") * unit;
+  const Coordinate& c = coordinate(i);
+  const double reach = (i < 3 ? limits.translation : limits.rotation) * c.shown;
+  return words.number(what, -reach, reach, std::string(c.shown_unit).c_str()) / c.shown;
 }
 
 Segment trajectory(Words& words, const SafetyLimits& limits) {
@@ -68,8 +71,8 @@ Segment trajectory(Words& words, const SafetyLimits& limits) {
   s.kind = SegmentKind::kTrajectory;
   s.duration = words.seconds();
   while (!words.empty()) {
-    const int i = coordinate(words.word("coordinate"));
-    const std::string name = kCoordinate[i];
+    const int i = coordinateNamed(words.word("coordinate"));
+    const std::string name(coordinate(i).name);
     Axis& axis = s.trajectory[static_cast<std::size_t>(i)];
     if (axis.motion != AxisMotion::kHold) throw InputError(name + ": given twice");
     const std::string motion = words.word((name + ": ramp or sine").c_str());
@@ -97,7 +100,7 @@ Segment move(Words& words, const SafetyLimits& limits) {
       s.duration = words.seconds("in", 0.1);
       continue;
     }
-    const int i = coordinate(word);
+    const int i = coordinateNamed(word);
     target(i) = within(words, word, i, limits);
   }
   s.target = Pose::from(target);

@@ -9,16 +9,16 @@
 #include <ctime>
 #include <fstream>
 
+#include "ves/base/coordinates.hpp"
 #include "ves/console/command.hpp"
 #include "ves/realtime/realtime.hpp"
-#include "ves/report/series.hpp"
+#include "ves/results/series.hpp"
 #include "ves/run/session.hpp"
 #include "ves/transport/channels.hpp"
 
 namespace ves {
 namespace {
 
-constexpr const char* kCoordinate[] = {"x", "y", "z", "alpha", "beta", "gamma"};
 constexpr const char* kChannel[] = {"Fx", "Fy", "Fz", "Mx", "My", "Mz"};
 constexpr int kTurn = 50;  // [ms] between looks at what happens
 
@@ -171,30 +171,30 @@ class Console {
   }
 
   std::string evidence(const state_t& s) const {
-    const auto i = static_cast<std::size_t>(s.unrest_index);
+    const auto i = static_cast<std::size_t>(s.violation_index);
     const StillnessLimits& limits = experiment_.controller.stillness;
-    switch (static_cast<Unrest>(s.unrest)) {
-      case Unrest::kLeg:
-        return fmt::format("leg {} moved by {} counts ({} allowed)", i + 1, s.unrest_amount,
+    switch (static_cast<StillnessViolation>(s.violation)) {
+      case StillnessViolation::kLeg:
+        return fmt::format("leg {} moved by {} counts ({} allowed)", i + 1, s.violation_amount,
                            limits.leg_counts);
-      case Unrest::kJoint: {
+      case StillnessViolation::kJoint: {
         const bool known = i < experiment_.joint_names.size();
         const bool turns =
-            known &&
-            experiment_.controller.payload.robot.link(s.unrest_index).type == JointType::kRevolute;
+            known && experiment_.controller.payload.robot.link(s.violation_index).type ==
+                         JointType::kRevolute;
         return fmt::format("{} moved by {:.4f} {} ({} allowed)",
                            known ? experiment_.joint_names[i] : fmt::format("joint {}", i + 1),
-                           s.unrest_amount, turns ? "rad" : "m", limits.joint);
+                           s.violation_amount, turns ? "rad" : "m", limits.joint);
       }
-      case Unrest::kChannel:
+      case StillnessViolation::kChannel:
         return fmt::format("{} scatters by {:.1f} counts ({} allowed): something shakes it",
-                           i < 6 ? kChannel[i] : "a channel", s.unrest_amount, limits.deviation);
-      case Unrest::kBias:
+                           i < 6 ? kChannel[i] : "a channel", s.violation_amount, limits.deviation);
+      case StillnessViolation::kBias:
         return fmt::format(
             "{} would have a bias of {:.0f} counts ({:.0f} allowed): it carries a load "
             "that is not in the model, or less than that",
-            i < 6 ? kChannel[i] : "a channel", s.unrest_amount, limits.bias);
-      case Unrest::kNone: break;
+            i < 6 ? kChannel[i] : "a channel", s.violation_amount, limits.bias);
+      case StillnessViolation::kNone: break;
     }
     return "no stream of new samples";
   }
@@ -313,8 +313,9 @@ class Console {
       return [=](const std::string& text) { parseNumber(text, "that", lo, hi, unit); };
     };
     const auto reach = [&](int i) {
-      return i < 3 ? between(-limits.translation * 1e3, limits.translation * 1e3, "mm")
-                   : between(-limits.rotation / kDegree, limits.rotation / kDegree, "deg");
+      const Coordinate& c = coordinate(i);
+      const double most = (i < 3 ? limits.translation : limits.rotation) * c.shown;
+      return between(-most, most, i < 3 ? "mm" : "deg");
     };
     const auto seconds = between(0.01, 1e5, "s");
     switch (verb) {
@@ -327,7 +328,7 @@ class Console {
       case Verb::kTrajectory: {
         if (!add("seconds", "3", seconds)) return {};
         for (int i = 0; i < 6; ++i) {
-          const std::string c = kCoordinate[i], unit = i < 3 ? "mm" : "deg";
+          const std::string c(coordinate(i).name), unit(coordinate(i).shown_unit);
           const auto motion =
               answer(fmt::format("{}, now {} {}: hold, ramp or sine", c, now(i), unit), "hold",
                      [](const std::string& text) {
@@ -348,9 +349,10 @@ class Console {
       }
       case Verb::kMove:
         for (int i = 0; i < 6; ++i) {
-          out += fmt::format(" {}", kCoordinate[i]);
-          if (!add(fmt::format("{}, now {} {}", kCoordinate[i], now(i), i < 3 ? "mm" : "deg"), "0",
-                   reach(i)))
+          out += fmt::format(" {}", coordinate(i).name);
+          if (!add(fmt::format("{}, now {} {}", coordinate(i).name, now(i),
+                               coordinate(i).shown_unit),
+                   "0", reach(i)))
             return {};
         }
         break;
@@ -376,7 +378,7 @@ class Console {
   std::string now(int i) const {
     if (!session_->state()) return "?";
     const double x = session_->state()->x[i];
-    return i < 3 ? fmt::format("{:+.1f}", x * 1e3) : fmt::format("{:+.2f}", x / kDegree);
+    return fmt::format("{:+.{}f}", x * coordinate(i).shown, i < 3 ? 1 : 2);
   }
 
   void ask() {

@@ -76,9 +76,9 @@ void Calibration::add(const Sample& sample, const Vec6& load) noexcept {
       return;
     }
     if (most <= limits_.deviation)
-      restart(Unrest::kBias, static_cast<int>(largest), bias);
+      restart(StillnessViolation::kBias, static_cast<int>(largest), bias);
     else
-      restart(Unrest::kChannel, static_cast<int>(worst), most);
+      restart(StillnessViolation::kChannel, static_cast<int>(worst), most);
   }
   if (samples_ >= kPatience) status_ = Status::kRefused;
 }
@@ -87,24 +87,24 @@ bool Calibration::moved(const Sample& sample) noexcept {
   for (std::size_t i = 0; i < kLegs; ++i) {
     const int change = std::abs(sample.legs[i] - first_.legs[i]);
     if (change > limits_.leg_counts) {
-      restart(Unrest::kLeg, static_cast<int>(i), change);
+      restart(StillnessViolation::kLeg, static_cast<int>(i), change);
       return true;
     }
   }
   for (int i = 0; i < kMaxJoints; ++i) {
     const double change = std::abs(sample.q(i) - first_.q(i));
     if (!(change <= limits_.joint)) {
-      restart(Unrest::kJoint, i, change);
+      restart(StillnessViolation::kJoint, i, change);
       return true;
     }
   }
   return false;
 }
 
-void Calibration::restart(Unrest what, int index, double amount) noexcept {
-  unrest_ = what;
-  unrest_index_ = index;
-  unrest_amount_ = amount;
+void Calibration::restart(StillnessViolation what, int index, double amount) noexcept {
+  violation_ = what;
+  violation_index_ = index;
+  violation_amount_ = amount;
   statistics_.reset();
   has_first_ = false;
 }

@@ -42,7 +42,7 @@ PathPoint<6> MotionGenerator::trajectoryGeneration() noexcept {
     case SegmentKind::kTrajectory:
     case SegmentKind::kPath: return plan_.at(n_, path_);
     case SegmentKind::kCalibration:
-    case SegmentKind::kWatch:
+    case SegmentKind::kMonitor:
     case SegmentKind::kAdmittance:
     case SegmentKind::kCount: break;
   }
@@ -60,11 +60,11 @@ void MotionGenerator::hold() noexcept {
 }
 
 bool MotionGenerator::over(std::int64_t tick) const noexcept {
-  return (segment_.kind == SegmentKind::kWatch ? tick - start_tick_ : n_) >= plan_.steps();
+  return (segment_.kind == SegmentKind::kMonitor ? tick - start_tick_ : n_) >= plan_.steps();
 }
 
 std::int64_t MotionGenerator::idleTicks(std::int64_t tick) const noexcept {
-  if (segment_.kind != SegmentKind::kWatch) return 0;
+  if (segment_.kind != SegmentKind::kMonitor) return 0;
   const std::int64_t interval = std::llround(segment_.interval / settings_.period);
   if (interval <= kCalibrationSamples) return 0;
   const std::int64_t since = tick - start_tick_, into = since % interval;

@@ -11,7 +11,7 @@ std::string_view name(SegmentKind kind) noexcept {
     case SegmentKind::kMove: return "move";
     case SegmentKind::kTrajectory: return "trajectory";
     case SegmentKind::kAdmittance: return "admittance";
-    case SegmentKind::kWatch: return "watch";
+    case SegmentKind::kMonitor: return "monitor";
     case SegmentKind::kPath: return "path";
     case SegmentKind::kCount: break;
   }

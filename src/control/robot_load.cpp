@@ -38,8 +38,9 @@ RobotInertia::RobotInertia(const ControllerConfig& config)
 Wrench RobotInertia::update(std::int64_t count, const JointVector& q, const Transform& X_IP,
                             const LegMotion& legs, bool engaged, double share) noexcept {
   if (!compensated_ || !engaged) return {};
-  if (count % mass_update_ == 0) composite_P_ = combine(RigidBody{}, X_PL0_, locked(carried_, q));
-  M_1_ = share * spatialMass(turned(X_IP.R, composite_P_));
+  if (count % mass_update_ == 0)
+    composite_P_ = combine(RigidBody{}, X_PL0_, compositeBody(carried_, q));
+  M_1_ = share * spatialMass(rotated(X_IP.R, composite_P_));
   BodyMotion P;
   if (!forwardMotion(geometry_, X_IP, legs, P)) return {};
   Vec6 acceleration;

@@ -27,7 +27,7 @@ std::string_view name(Check check) noexcept {
     case Check::kConditioning: return "conditioning";
     case Check::kVelocity: return "velocity";
     case Check::kFlow: return "flow limits";
-    case Check::kRival: return "second controller or machine";
+    case Check::kConflictingNode: return "second controller or machine";
     case Check::kCount: break;
   }
   return "none";

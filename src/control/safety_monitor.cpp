@@ -35,7 +35,7 @@ Tripped SafetyMonitor::check(const Proposal& p, const LegContext& context,
   t.require(Check::kSensorSaturated, saturationCheck(sample.adc));
   t.require(Check::kSensorFrozen, frozen_.good(limits));
   t.require(Check::kOscillation, oscillation.good(limits));
-  t.require(Check::kRival, !conflict);
+  t.require(Check::kConflictingNode, !conflict);
   return t;
 }
 

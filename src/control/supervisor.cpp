@@ -264,7 +264,7 @@ void Supervisor::report(TickState& state) const noexcept {
   state.order = order_;
   state.refusal = refusal_;
   state.refused_by = refused_by_;
-  state.cut_short = aborted_;
+  state.aborted = aborted_;
   state.tripped = tripped_;
   state.latched = latched_;
   state.cause = cause_;

@@ -34,7 +34,7 @@ const TickState& TestPlatform::tick(const TickInput& in) noexcept {
   const bool engaged = commander_.command().engaged;
   const bool following = engaged && !supervisor_.stopped();
   const Elapsed& elapsed = clock_.update(in.tick);
-  samples_.update(in.sample, engaged, in.rival);
+  samples_.update(in.sample, engaged, in.conflicting_node);
   if (following) share_.advance();
   const Sample& sample = samples_.sample();
   const Transform& X_IP = legs_.update(samples_, elapsed, following, commander_).X_IP;  // (2.23)
@@ -45,10 +45,10 @@ const TickState& TestPlatform::tick(const TickInput& in) noexcept {
   // pass as a wrench of the robot's weight.
   Wrenches W;
   W.total = forceMeasurement(config_.sensor, bias_.counts(), sample.adc, X_IP.R);  // (C.1)
-  W.fixed = gravityCompensation(config_.payload, X_IP.R, load_.wrench());          // (B.4)
+  W.static_wrench = gravityCompensation(config_.payload, X_IP.R, load_.wrench());  // (B.4)
   W.inertial =
       robot_.update(elapsed.count, sample.q, X_IP, legs_.filteredMotion(), engaged, share_.value());
-  W.dynamic = W.total - W.fixed + W.inertial;
+  W.dynamic = W.total - W.static_wrench + W.inertial;
   safety_.watch(elapsed, samples_, load_.counts());
 
   const Situation now{config_,      safety_.path(),     in.tick, samples_.freshTicks(), W.dynamic,
@@ -58,9 +58,9 @@ const TickState& TestPlatform::tick(const TickInput& in) noexcept {
   supervisor_.advance(now, act);
 
   Proposal next = inverseKinematics(config_.geometry, nextMotion(W.dynamic));  // (C.11), (C.12)
-  if (supervisor_.trip(safetyChecks(next, W.dynamic, in.rival), now, act)) {
+  if (supervisor_.trip(safetyChecks(next, W.dynamic, in.conflicting_node), now, act)) {
     next = inverseKinematics(config_.geometry, nextMotion(W.dynamic));  // begins to brake
-    supervisor_.tripStopping(safetyChecks(next, W.dynamic, in.rival), act);
+    supervisor_.tripStopping(safetyChecks(next, W.dynamic, in.conflicting_node), act);
   }
   if (supervisor_.stopped())
     hold();
@@ -120,7 +120,7 @@ const TickState& TestPlatform::report(const Wrenches& W) noexcept {
   commander_.allowPark(phase != Phase::kStopped && phase != Phase::kStopping);
   const Elapsed& elapsed = clock_.elapsed();
   state_.kind = supervisor_.kind(motion_);
-  state_.idle = state_.kind == SegmentKind::kWatch ? motion_.idleTicks(elapsed.tick) : 0;
+  state_.idle = state_.kind == SegmentKind::kMonitor ? motion_.idleTicks(elapsed.tick) : 0;
   clock_.announceIdle(state_.idle);
 
   supervisor_.report(state_);
@@ -130,13 +130,13 @@ const TickState& TestPlatform::report(const Wrenches& W) noexcept {
   state_.sample_sequence = samples_.sample().sequence;
   state_.age = samples_.age();
   state_.total = W.total;
-  state_.fixed = W.fixed;
+  state_.static_wrench = W.static_wrench;
   state_.inertial = W.inertial;
   state_.dynamic = W.dynamic;
-  state_.compensated = share_.value();
+  state_.compensation_share = share_.value();
   state_.motion = motion_.motion();
-  state_.due = motion_.desired();
-  state_.slowed = motion_.admittance().scale();
+  state_.desired = motion_.desired();
+  state_.envelope_scale = motion_.admittance().scale();
   state_.legs = commander_.legs();
   state_.reference = commander_.reference();
   state_.command = commander_.command();
@@ -146,9 +146,9 @@ const TickState& TestPlatform::report(const Wrenches& W) noexcept {
   state_.deviation = bias_.deviation();
   state_.standard_error = bias_.standardError();
   state_.calibration = bias_.calibration().status();
-  state_.unrest = bias_.calibration().unrest();
-  state_.unrest_index = bias_.calibration().unrestIndex();
-  state_.unrest_amount = bias_.calibration().unrestAmount();
+  state_.violation = bias_.calibration().violation();
+  state_.violation_index = bias_.calibration().violationIndex();
+  state_.violation_amount = bias_.calibration().violationAmount();
   return state_;
 }
 

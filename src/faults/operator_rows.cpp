@@ -68,7 +68,7 @@ FaultOutcome sensorReversed(Experiment e) {
     return Order();
   });
   return outcome(
-      calibration == Calibration::Status::kRefused && r.cut_short && r.phase == Phase::kParked,
+      calibration == Calibration::Status::kRefused && r.aborted && r.phase == Phase::kParked,
       fmt::format("calibration {}, {}; {:.0f} N left of the weight",
                   calibration == Calibration::Status::kRefused ? "refused" : "TAKEN", name(r.phase),
                   seen));
@@ -127,20 +127,20 @@ FaultOutcome sixLateTicks(Lockstep loop) {
 
 FaultOutcome conflictBeforeArming(Lockstep loop) {
   run(loop, 20);
-  loop.input.rival = true;
+  loop.input.conflicting_node = true;
   loop.step(ask(Request::kArm));
   run(loop, 300);
   const TickState& s = loop.state();
-  return outcome(s.phase == Phase::kDisarmed && s.tripped.has(Check::kRival),
+  return outcome(s.phase == Phase::kDisarmed && s.tripped.has(Check::kConflictingNode),
                  fmt::format("{} for {} ticks: {}", name(s.phase), 300, name(s.tripped.first())));
 }
 
 FaultOutcome conflictInMotion(Lockstep loop) {
   swing(loop, 0.1, 100);
-  loop.input.rival = true;
+  loop.input.conflicting_node = true;
   const std::int64_t detected = ticksUntil(loop, stopped);
   const TickState& s = loop.state();
-  return outcome(s.cause == Check::kRival && s.phase == Phase::kStopped,
+  return outcome(s.cause == Check::kConflictingNode && s.phase == Phase::kStopped,
                  fmt::format("{}: {}", name(s.phase), name(s.cause)), detected);
 }
 

@@ -64,12 +64,13 @@ FaultOutcome run(const Experiment& e, const Expectation& expected) {
     if (detected < 0 && s.latched.any()) detected = s.tick;
     braked = braked || s.phase == Phase::kStopping;
     if (injected >= 0 && s.tick >= injected)
-      out.peak_deviation = std::max(out.peak_deviation, (s.due.head<3>() - s.measured.p).norm());
+      out.peak_deviation =
+          std::max(out.peak_deviation, (s.desired.head<3>() - s.measured.p).norm());
     farthest = std::max(farthest, s.measured.p.norm());
     last = s;
     return Order();
   });
-  bool as_expected = result.phase == expected.phase && result.cut_short == expected.aborted;
+  bool as_expected = result.phase == expected.phase && result.aborted == expected.aborted;
   if (result.phase == Phase::kStopped) {
     if (injected >= 0) out.ticks = detected - injected;
     out.what = fmt::format("{}: {}", braked ? "controlled stop" : "freeze", names(last.latched));
@@ -77,7 +78,7 @@ FaultOutcome run(const Experiment& e, const Expectation& expected) {
         as_expected && std::count(expected.causes.begin(), expected.causes.end(), result.cause) > 0;
   } else {
     out.what = fmt::format("{}{} after {} ticks, at most {:.0f} mm from home", name(result.phase),
-                           result.cut_short ? fmt::format(" early ({})", name(last.refusal)) : "",
+                           result.aborted ? fmt::format(" early ({})", name(last.refusal)) : "",
                            result.ticks, farthest * 1e3);
   }
   for (const Check check : expected.with) as_expected = as_expected && last.latched.has(check);

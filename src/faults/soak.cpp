@@ -130,7 +130,7 @@ SoakResult soak(const std::filesystem::path& config, std::int64_t ticks, std::ui
       fault = drawFault(dice);
       fault_until = out.ticks + (1 << dice.pick(8));
     }
-    loop.input.rival = dice.chance(1e-5);
+    loop.input.conflicting_node = dice.chance(1e-5);
     const TickState& s = loop.tick();
     if (s.phase == Phase::kArmed && before == Phase::kDisarmed && out.stops > 0) ++out.recoveries;
     if (s.phase == Phase::kStopped && before != Phase::kStopped) ++out.stops;

@@ -151,7 +151,7 @@ MatrixXd countRegressor(const StaticSetup& setup, const JointVector& q, const Ve
 }
 
 MassEstimate estimateMasses(const StaticSetup& setup, const SeparableCombinations& combinations,
-                            const std::vector<Rest>& rests) {
+                            const std::vector<StaticInterval>& rests) {
   const Index r = combinations.rank(), unknowns = r + 12, rows = 6 * std::ssize(rests);
   if (rows < unknowns + 6)
     throw std::domain_error(
@@ -159,13 +159,13 @@ MassEstimate estimateMasses(const StaticSetup& setup, const SeparableCombination
                     "at least {} poses",
                     rests.size(), rows, unknowns, (unknowns + 11) / 6));
   double middle = 0.0, span = 1.0;
-  for (const Rest& rest : rests) middle += rest.t / static_cast<double>(rests.size());
-  for (const Rest& rest : rests) span = std::max(span, std::abs(rest.t - middle));
+  for (const StaticInterval& rest : rests) middle += rest.t / static_cast<double>(rests.size());
+  for (const StaticInterval& rest : rests) span = std::max(span, std::abs(rest.t - middle));
 
   MatrixXd A = MatrixXd::Zero(rows, unknowns);
   VectorXd b(rows);
   for (Index k = 0; k < std::ssize(rests); ++k) {
-    const Rest& rest = rests[static_cast<std::size_t>(k)];
+    const StaticInterval& rest = rests[static_cast<std::size_t>(k)];
     const MatrixXd Y = countRegressor(setup, rest.q, rest.rpy);
     A.block(6 * k, 0, 6, r) = Y(Eigen::all, combinations.leads);
     A.block(6 * k, r, 6, 6) = Mat6::Identity();

@@ -194,7 +194,7 @@ void Plant::readTransducers() noexcept {
 
 Wrench Plant::sensorLoad() const noexcept {
   const Transform X_PL0 = config_.payload.X_PL0();
-  const FeltMotion felt = feltMotion(truth_.P, X_PL0, config_.gravity);
+  const ProperMotion felt = properMotion(truth_.P, X_PL0, config_.gravity);
   const Wrench on_robot = newtonEuler(carried_, truth_.joints, felt).F_L0o_L0;
   return transfer(X_SL0_, Wrench{} - on_robot);
 }

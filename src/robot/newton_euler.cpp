@@ -3,14 +3,14 @@
 
 namespace ves {
 
-FeltMotion feltMotion(const BodyMotion& P, const Transform& X_PB, const Vec3& g_I) noexcept {
+ProperMotion properMotion(const BodyMotion& P, const Transform& X_PB, const Vec3& g_I) noexcept {
   const Mat3 R_BI = (P.X.R * X_PB.R).transpose();
   const Vec3 p_PB_I = P.X.R * X_PB.p;
   return {R_BI * P.w, R_BI * P.alpha,
           R_BI * (P.a - g_I + P.alpha.cross(p_PB_I) + P.w.cross(P.w.cross(p_PB_I)))};
 }
 
-Wrench inertialWrench(const RigidBody& body, const FeltMotion& B) noexcept {
+Wrench inertialWrench(const RigidBody& body, const ProperMotion& B) noexcept {
   const Vec3& c = body.p_BoBcm_B;
   const Vec3 F = body.mass * (B.a + B.alpha.cross(c) + B.w.cross(B.w.cross(c)));
   const Vec3 N = body.I_Bcm_B * B.alpha + B.w.cross(body.I_Bcm_B * B.w);
@@ -18,19 +18,19 @@ Wrench inertialWrench(const RigidBody& body, const FeltMotion& B) noexcept {
 }
 
 InverseDynamics newtonEuler(const RobotModel& robot, const JointState& q,
-                            const FeltMotion& L0) noexcept {
+                            const ProperMotion& L0) noexcept {
   std::array<Transform, kMaxJoints> X;  // link i in its parent
   std::array<Wrench, kMaxJoints> F;     // inertial wrench of link i, about its origin, its axes
 
   // Outward: motion of each link, and the wrench it takes.
-  FeltMotion parent = L0;
+  ProperMotion parent = L0;
   for (int i = 0; i < robot.joints; ++i) {
     const auto k = static_cast<std::size_t>(i);
     const Link& link = robot.links[k];
     X[k] = linkPose(link, q.q(i));
     const Mat3 R = X[k].R.transpose();
     const Vec3& p = X[k].p;
-    FeltMotion m;
+    ProperMotion m;
     m.w = R * parent.w;
     m.alpha = R * parent.alpha;
     m.a = R * (parent.a + parent.alpha.cross(p) + parent.w.cross(parent.w.cross(p)));

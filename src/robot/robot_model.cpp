@@ -17,7 +17,7 @@ RigidBody combine(const RigidBody& a_A, const Transform& X_AB, const RigidBody& 
   return sum;
 }
 
-RigidBody turned(const Mat3& R_AB, const RigidBody& body_B) noexcept {
+RigidBody rotated(const Mat3& R_AB, const RigidBody& body_B) noexcept {
   return {body_B.mass, R_AB * body_B.p_BoBcm_B, R_AB * body_B.I_Bcm_B * R_AB.transpose()};
 }
 
@@ -29,7 +29,7 @@ Mat6 spatialMass(const RigidBody& body) noexcept {
   return M;
 }
 
-RigidBody locked(const RobotModel& robot, const JointVector& q) noexcept {
+RigidBody compositeBody(const RobotModel& robot, const JointVector& q) noexcept {
   RigidBody all = robot.base;
   Transform X_L0Li;
   for (int i = 0; i < robot.joints; ++i) {

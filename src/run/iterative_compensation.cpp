@@ -53,18 +53,18 @@ class Passes {
         static_cast<double>((e.controller.path.cols() - 1) * period) * kSecondPerNanosecond;
 
     felt = Wrenches::Zero(6, path.cols());
-    Eigen::VectorXd looks = Eigen::VectorXd::Zero(path.cols());
+    Eigen::VectorXd readings = Eigen::VectorXd::Zero(path.cols());
     std::int64_t n = 0;
     const RunResult run = runLockstep(e, nullptr, [&](const TickState& state) {
       if (state.phase == Phase::kRunning && state.segment == kPath) {
         ++n;
         const Eigen::Index nearest = std::min((n + slower / 2) / slower, path.cols() - 1);
         felt.col(nearest) += state.total.stacked();
-        looks(nearest) += 1.0;
+        readings(nearest) += 1.0;
       }
       return Order();
     });
-    felt.array().rowwise() /= looks.cwiseMax(1.0).transpose().array();
+    felt.array().rowwise() /= readings.cwiseMax(1.0).transpose().array();
     result_.machine_time += run.simulated;
     if (run.cause != Check::kCount) result_.stopped_by = run.cause;
     return run.good();

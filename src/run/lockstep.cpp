@@ -2,8 +2,8 @@
 #include "ves/simulation/lockstep.hpp"
 #include "ves/base/build.hpp"
 #include "ves/realtime/realtime.hpp"
-#include "ves/run/ending.hpp"
 #include "ves/run/run.hpp"
+#include "ves/run/run_monitor.hpp"
 #include "ves/transport/channels.hpp"
 
 namespace ves {
@@ -11,6 +11,7 @@ namespace ves {
 experiment_t describe(const Experiment& experiment, const Identity& from, std::int64_t time) {
   experiment_t m;
   m.header = header(from, 0, time);
+  m.schema = kSchema;
   m.name = experiment.name;
   m.hash = experiment.hash;
   m.version = describeBuild();
@@ -22,7 +23,7 @@ RunResult runLockstep(const Experiment& experiment, LogWriter* log, const Watch&
                       Request first) {
   const Identity controller{1, 0}, machine{2, 0};
   Lockstep loop(experiment.controller, experiment.plant);
-  Ending ending(experiment.controller);
+  RunMonitor monitor(experiment.controller);
   const auto time = [&] { return loop.plant().time(); };
   const auto record = [&](const std::string& channel, const auto& message) {
     if (log) log->write(channel, message, time());
@@ -43,14 +44,14 @@ RunResult runLockstep(const Experiment& experiment, LogWriter* log, const Watch&
     }
     Order& order = loop.input.order;
     order = watch ? watch(state) : Order();
-    if (ending.reached(state, order.request)) break;
+    if (monitor.reached(state, order.request)) break;
     if (order.request == Request::kRun) {
       order.id = {controller.source, orders++};
       record(channel::kOperator,
              toMessage(order, controller.source, header(controller, order.id.sequence, time())));
     }
   }
-  RunResult result = ending.result(monotonicNow() - start);
+  RunResult result = monitor.result(monotonicNow() - start);
   if (log) result.lost = log->lost();
   return result;
 }

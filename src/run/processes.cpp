@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
-#include "ves/realtime/histogram.hpp"
+#include "ves/realtime/latency.hpp"
 #include "ves/realtime/realtime.hpp"
-#include "ves/run/ending.hpp"
 #include "ves/run/flight_record.hpp"
 #include "ves/run/run.hpp"
+#include "ves/run/run_monitor.hpp"
 #include "ves/transport/channels.hpp"
 
 namespace ves {
@@ -28,7 +28,7 @@ void count(timing_t& t) noexcept {
   ++t.sample_to_command[latencyBin(t.sample_to_command_ns)];
 }
 
-void conduct(const char* who, int priority, bool required) {
+void enableRealtime(const char* who, int priority, bool required) {
   if (!claimRealtime(priority, required))
     fmt::print(stderr,
                "{}: no real-time privileges, running at best effort; ./ves doctor says why\n", who);
@@ -43,7 +43,7 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
   ControllerLink link(bus, self);
   TestPlatform platform(experiment.controller);
   FlightRecord flight(experiment, options.flight);
-  Ending ending(experiment.controller, !options.start);
+  RunMonitor monitor(experiment.controller, !options.start);
 
   std::unique_ptr<LogWriter> log;
   if (!options.log.empty()) {
@@ -63,8 +63,8 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
   const auto finish = [&](const TickState& state) {
     in.order = watch(state);
     if (in.order.request == Request::kNone) in.order = link.takeOrder();
-    in.rival = link.takeRival();
-    return ending.reached(state, in.order.request);
+    in.conflicting_node = link.takeConflict();
+    return monitor.reached(state, in.order.request);
   };
 
   // Before the first tick there is nothing to come home from.
@@ -111,10 +111,10 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
       in.tick += 1 + state.idle;
       bus.drain();
     }
-    return ending.result(monotonicNow() - start);
+    return monitor.result(monotonicNow() - start);
   }
 
-  conduct("controller", kControllerPriority, options.realtime);
+  enableRealtime("controller", kControllerPriority, options.realtime);
   while (link.sample().sequence < 0) {
     if (wantsOut()) return letGo();
     if (monotonicNow() - start > kFirstSampleTime)
@@ -125,14 +125,14 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
   timing_t timing{};
   std::int64_t woke = monotonicNow();
   for (;; ++in.tick) {
-    in.ran_long = monotonicNow() - woke > experiment.controller.period;
+    const bool ran_long = monotonicNow() - woke > experiment.controller.period;
     const std::int64_t missed = ticker.wait();
     in.tick += missed;
     woke = monotonicNow();
     bus.drain();
     in.sample = link.sample();
     const std::int64_t sample_time = link.sampleTime();
-    in.rival = link.takeRival() || in.rival;
+    in.conflicting_node = link.takeConflict() || in.conflicting_node;
     const std::int64_t received = monotonicNow();
 
     const TickState& state = platform.tick(in);
@@ -155,12 +155,12 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
     timing.sample_age_ns = woke - sample_time;
     timing.sample_to_command_ns = sent - sample_time;
     timing.missed = ticker.missed();
-    (in.ran_long ? timing.missed_ran_long : timing.missed_woke_late) += missed;
+    (ran_long ? timing.missed_ran_long : timing.missed_woke_late) += missed;
     count(timing);
     bus.publish(channel::kTiming, timing);
     if (finish(state)) break;
   }
-  return ending.result(monotonicNow() - start);
+  return monitor.result(monotonicNow() - start);
 }
 
 void runPlant(const Experiment& experiment, const ProcessOptions& options,
@@ -210,7 +210,7 @@ void runPlant(const Experiment& experiment, const ProcessOptions& options,
     return;
   }
 
-  conduct("plant", kPlantPriority, options.realtime);
+  enableRealtime("plant", kPlantPriority, options.realtime);
   const std::int64_t start = monotonicNow();
   Ticker ticker(kPlantPeriod);
   while (!stop()) {

@@ -70,7 +70,7 @@ void Session::receive(const std::string& channel, const void* data, std::uint32_
                       ? Tripped(static_cast<std::uint32_t>(state->tripped)).first()
                       : static_cast<Check>(state->cause);
   result_.cause_tick = state->cause_tick;
-  result_.cut_short = state->cut_short != 0;
+  result_.aborted = state->aborted != 0;
   if (on_state_) on_state_(*state);
 }
 
@@ -123,7 +123,7 @@ RunResult Session::result() {
   // The last state may be lost on the way; the exit status is not.
   if (status == 0 && result.phase == Phase::kDisarmed) result.let_go = true;
   if (status == 0 && !result.let_go) result.phase = Phase::kParked;
-  if (status == 1 && result.phase == Phase::kParked && !result.cut_short)
+  if (status == 1 && result.phase == Phase::kParked && !result.aborted)
     result.phase = Phase::kStopped;
   result.lost = bus_.failed() + (log_ ? log_->lost() + result.ticks - heard_ : 0);
   return result;

@@ -33,7 +33,7 @@ struct Builder {
       at = next;
     }
   }
-  void operator()(const ArmHousing& housing) { frame.lump(at, turned(X_AB.R, housing.body)); }
+  void operator()(const ArmHousing& housing) { frame.lump(at, rotated(X_AB.R, housing.body)); }
 };
 
 }  // namespace
@@ -42,7 +42,7 @@ ArmModel assemble(const ArmDescription& arm) {
   Builder build{arm.stiffness_scale, {}, {}};
   for (const ArmPart& part : arm.chain) std::visit(build, part);
   const Transform X_AP{build.X_AB.R * arm.R_TP, build.X_AB.p};
-  build.frame.lump(build.at, turned(X_AP.R, arm.payload_P));
+  build.frame.lump(build.at, rotated(X_AP.R, arm.payload_P));
   return {build.frame, build.at, X_AP};
 }
 

@@ -49,7 +49,7 @@ class Equations {
     now_ = now;
     if (options_.hold_mass > 0 && step % options_.hold_mass == 0 && step != held_at_) {
       held_at_ = step;
-      held_ = locked(robot_, joints_.at(now_).q);
+      held_ = compositeBody(robot_, joints_.at(now_).q);
     }
   }
   void move(const RobotMove& move) { joints_.move(move, now_); }
@@ -88,12 +88,12 @@ class Equations {
 
  private:
   /// What the base feels of the robot, about Po in P.
-  Wrench reaction(const JointState& q, const FeltMotion& L0) const {
+  Wrench reaction(const JointState& q, const ProperMotion& L0) const {
     return transfer(X_PL0_, Wrench{} - newtonEuler(robot_, q, L0).F_L0o_L0);
   }
 
   RigidBody lockedInP(const JointVector& q) const {
-    return combine(RigidBody{}, X_PL0_, options_.hold_mass > 0 ? held_ : locked(robot_, q));
+    return combine(RigidBody{}, X_PL0_, options_.hold_mass > 0 ? held_ : compositeBody(robot_, q));
   }
 
   /// (3.11): A, and what stands beside stiffness and damping on its right.
@@ -105,7 +105,7 @@ class Equations {
     const Vec3 w = Phi_l * eta_dot;
     const Vec3 centripetal = robot.mass * w.cross(Rx * w);
     right += (Phi_u.transpose() + Phi_l.transpose() * Rx) * centripetal;
-    right += base_.Phi.transpose() * reaction(q, FeltMotion{}).stacked();
+    right += base_.Phi.transpose() * reaction(q, ProperMotion{}).stacked();
   }
 
   void whole(const JointState& q, const VectorXd& y, MatrixXd& A, VectorXd& right) const {
@@ -114,9 +114,10 @@ class Equations {
     P.X.R = Eigen::Quaterniond(Eigen::Vector4d(y.tail<4>())).normalized().toRotationMatrix();
     P.w = base_.Phi.bottomRows<3>() * y.segment(k, k);
     // The wrench is affine in the base's acceleration: this much without, the locked mass with it.
-    const Wrench F_Po_P = reaction(q, feltMotion(P, X_PL0_, Vec3::Zero()));
+    const Wrench F_Po_P = reaction(q, properMotion(P, X_PL0_, Vec3::Zero()));
     right += base_.Phi.transpose() * rotate(P.X.R, F_Po_P).stacked();
-    const Mat6 M_1 = spatialMass(turned(P.X.R, combine(RigidBody{}, X_PL0_, locked(robot_, q.q))));
+    const Mat6 M_1 =
+        spatialMass(rotated(P.X.R, combine(RigidBody{}, X_PL0_, compositeBody(robot_, q.q))));
     A = MatrixXd::Identity(k, k) + base_.Phi.transpose() * M_1 * base_.Phi;
   }
 

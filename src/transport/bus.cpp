@@ -112,7 +112,7 @@ ControllerLink::ControllerLink(Bus& bus, const Identity& self) : bus_(bus), self
     const bool same =
         message && message->header.source == plant_.source && message->header.epoch == plant_.epoch;
     const bool renewed = message && !same && !engaged_ && message->header.epoch > plant_.epoch;
-    if (sample && !same && !renewed) rival_ = true;
+    if (sample && !same && !renewed) conflict_ = true;
     if (!sample || !(renewed || (same && sample->sequence >= sample_.sequence))) {
       ++rejected_;
       return;
@@ -127,7 +127,7 @@ ControllerLink::ControllerLink(Bus& bus, const Identity& self) : bus_(bus), self
                   const auto message = decode<leg_command_t>(data, size);
                   if (!message) ++rejected_;
                   if (message && message->header.source != self_.source && message->engaged)
-                    rival_ = true;
+                    conflict_ = true;
                 });
   bus.subscribe(channel::kOperator,
                 [this](const std::string&, const void* data, std::uint32_t size) {

@@ -81,41 +81,40 @@ state_t toMessage(const TickState& state, const TickInput& in, const header_t& h
   m.order_sequence = state.order.sequence;
   m.refusal = static_cast<std::int32_t>(state.refusal);
   m.refused_by = static_cast<std::int32_t>(state.refused_by);
-  m.rival = in.rival ? 1 : 0;
-  m.ran_long = in.ran_long ? 1 : 0;
+  m.conflicting_node = in.conflicting_node ? 1 : 0;
   m.phase = static_cast<std::int32_t>(state.phase);
   m.segment = state.segment;
   m.kind = static_cast<std::int32_t>(state.kind);
   m.idle = state.idle;
   m.age = state.age;
   put(state.total.stacked(), m.total);
-  put(state.fixed.stacked(), m.fixed);
+  put(state.static_wrench.stacked(), m.static_wrench);
   put(state.inertial.stacked(), m.inertial);
   put(state.dynamic.stacked(), m.dynamic);
   put(state.motion.x, m.x);
   put(state.motion.x_dot, m.x_dot);
   put(state.motion.x_ddot, m.x_ddot);
-  put(state.due, m.x_due);
+  put(state.desired, m.x_desired);
   put(state.legs.L, m.leg);
   put(state.legs.L_dot, m.leg_dot);
   put(state.legs.L_ddot, m.leg_ddot);
-  m.compensated = state.compensated;
+  m.compensation_share = state.compensation_share;
   put(state.reference, m.reference);
   put(state.L_measured, m.leg_measured);
   put(state.measured.stacked(), m.x_measured);
   put(state.bias, m.bias);
   m.calibration = static_cast<std::int32_t>(state.calibration);
-  m.unrest = static_cast<std::int32_t>(state.unrest);
-  m.unrest_index = state.unrest_index;
-  m.unrest_amount = state.unrest_amount;
+  m.violation = static_cast<std::int32_t>(state.violation);
+  m.violation_index = state.violation_index;
+  m.violation_amount = state.violation_amount;
   put(state.deviation, m.deviation);
   put(state.standard_error, m.standard_error);
   m.tripped = static_cast<std::int32_t>(state.tripped.bits());
   m.latched = static_cast<std::int32_t>(state.latched.bits());
   m.cause = static_cast<std::int32_t>(state.cause);
   m.cause_tick = state.cause_tick;
-  m.cut_short = state.cut_short ? 1 : 0;
-  m.slowed = state.slowed;
+  m.aborted = state.aborted ? 1 : 0;
+  m.envelope_scale = state.envelope_scale;
   m.late_ticks = state.late_ticks;
   m.engaged = state.command.engaged ? 1 : 0;
   m.park = state.command.park ? 1 : 0;
@@ -174,8 +173,8 @@ robot_command_t toMessage(const RobotMove& move, const header_t& header) noexcep
 
 template <>
 std::optional<experiment_t> decode<experiment_t>(const void* data, std::int64_t size) {
-  constexpr std::int64_t kFixed = 8 + 32;  // [B] fingerprint and header_t
-  constexpr int kStrings = 4;              // name, hash, version, resolved
+  constexpr std::int64_t kFixed = 8 + 32 + 4;  // [B] fingerprint, header_t, schema
+  constexpr int kStrings = 4;                  // name, hash, version, resolved
   const auto* bytes = static_cast<const std::uint8_t*>(data);
   if (size < kFixed || size > INT32_MAX) return {};
   std::int64_t at = kFixed;
@@ -248,7 +247,7 @@ std::optional<Order> fromMessage(const operator_t& m) noexcept {
   if (order.request != Request::kRun) return order;
 
   Segment& s = order.segment;
-  if (!inRange(m.kind, 0, static_cast<int>(SegmentKind::kWatch))) return {};
+  if (!inRange(m.kind, 0, static_cast<int>(SegmentKind::kMonitor))) return {};
   s.kind = static_cast<SegmentKind>(m.kind);
   s.duration = m.duration;
   s.interval = m.interval;

@@ -16,7 +16,7 @@
 #include "support/robots.hpp"
 #include "ves/control/gravity_compensation.hpp"
 #include "ves/realtime/realtime.hpp"
-#include "ves/replay/replay.hpp"
+#include "ves/run/replay.hpp"
 #include "ves/run/run.hpp"
 
 namespace ves {
@@ -89,7 +89,7 @@ void newtonEulerOf(benchmark::State& state, const char* name) {
   q.q_ddot.setConstant(-0.2);
   for (auto _ : state) {
     benchmark::DoNotOptimize(q);
-    benchmark::DoNotOptimize(newtonEuler(robot, q, feltMotion(P, {}, {0.0, 0.0, -9.81})));
+    benchmark::DoNotOptimize(newtonEuler(robot, q, properMotion(P, {}, {0.0, 0.0, -9.81})));
   }
 }
 void NewtonEulerMovingBasePuma(benchmark::State& state) { newtonEulerOf(state, "puma560"); }

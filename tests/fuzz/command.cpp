@@ -22,7 +22,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   try {
     ves::Value document = ves::parseDocument("a: {b: 1, c: [1, 2]}", "base.yaml");
-    ves::override(document, line);
+    ves::applyOverride(document, line);
     ves::emit(document);
   } catch (const ves::InputError&) {
   }

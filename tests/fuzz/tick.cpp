@@ -56,7 +56,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     ++all_ticks;
     input.tick += 1;
     input.order = {};
-    input.rival = false;
+    input.conflicting_node = false;
     if (state.command.engaged) {
       const Vec6 L = legLengths(e.controller.legs, state.command.counts);
       fuzz::require(L.minCoeff() >= limits.leg_min - count &&
@@ -87,7 +87,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       case 5: s.switches = what / 16; break;
       case 6: s.sequence += in.take<std::int8_t>(); break;
       case 7: s.temperature = in.take<double>(); break;
-      case 8: input.rival = what & 16; break;
+      case 8: input.conflicting_node = what & 16; break;
       case 9: input.tick += what / 16; break;
       case 10:
         input.order.request = Request::kRun;

@@ -109,7 +109,7 @@ class Recorder {
       injector.apply(fault, i <= fault_until, e.plant.sensor.volts_per_count, sample);
       if (const auto let_in = fromMessage(toMessage(sample, {2, 0}, in.tick - 1)))
         in.sample = *let_in;
-      in.rival = chance(2e-4);
+      in.conflicting_node = chance(2e-4);
       const TickState& s = platform.tick(in);
       const header_t h = header({1, 0}, in.tick, plant.time());
       log.write(channel::kState, toMessage(s, in, h), plant.time());
@@ -135,7 +135,7 @@ class Recorder {
         plant.moveRobot({pick(6), 0.5 * (pick(2001) - 1000) * 1e-3, 0.5 + 0.01 * pick(300)});
       plant.command(s.command);
       in.tick += 1 + s.idle + (chance(0.003) ? 1 + pick(6) : 0);
-      in.ran_long = chance(0.5);
+      (void)chance(0.5);  // as many draws as ever
       plant.advance(in.tick * e.controller.period);
     }
   }
@@ -224,7 +224,7 @@ void recordOrders(const Recorder& r) {
   r.run("loaded", "free_decay", {"program=[{admittance: {duration_s: 3}}]"});
   r.run("ends_in_motion", "free_decay",
         {"program=[{trajectory: {duration_s: 1.3, x: {sine: {amplitude_m: 0.05, frequency_hz: "
-         "0.4}}}}, {watch: {duration_s: 30, interval_s: 10}}, {trajectory: {duration_s: 1, beta: "
+         "0.4}}}}, {monitor: {duration_s: 30, interval_s: 10}}, {trajectory: {duration_s: 1, beta: "
          "{ramp: {to_deg: 5}}}}]"});
 }
 

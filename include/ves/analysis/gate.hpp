@@ -14,7 +14,7 @@ namespace ves {
 /// programPoses().
 struct LoopVerdict {
   bool stable = true;
-  Slowest worst;
+  DominantRoot worst;
   Direction direction = Direction::kExtending;
   Loop extending, retracting;  // in the pose where each is worst
   int modes = 0;               // [-] kept

@@ -37,7 +37,7 @@ struct Loop {
   double sensor_cutoff = 0.0;    // [rad/s]
   int delay = 0;                 // [ticks] that a sample is older than it need be
   /// Of the compensation, when it is on.
-  struct Believed {
+  struct Model {
     bool feed_forward = false, inertia = false;
     RigidBody robot_P;
     ServoModel servo;  // all legs alike, one gain for both directions, no rail
@@ -47,7 +47,7 @@ struct Loop {
       servo.extend.setConstant(gain);
       servo.retract.setConstant(gain);
     }
-  } believed;
+  } model;
 };
 
 /// The gain of a leg depends on which way it moves. A leg that swings has the harmonic mean, as
@@ -59,13 +59,13 @@ Loop loopOf(const ControllerConfig& controller, const plant::PlantConfig& plant,
             const JointVector& q, Direction direction);
 
 /// The root of largest magnitude.
-struct Slowest {
+struct DominantRoot {
   double radius = 0.0;        // [-] a period; above 1 the emulation diverges
   double growth = 0.0;        // [1/s]
   double frequency = 0.0;     // [Hz]
   Vec6 shape = Vec6::Zero();  // [m, rad] of the commanded motion, largest entry 1
 };
-Slowest slowest(const Loop& loop);
+DominantRoot dominantRoot(const Loop& loop);
 
 /// Without the shape, which costs more than the root.
 double radius(const Loop& loop);

@@ -49,7 +49,7 @@ Value loadDocument(const std::filesystem::path& path);
 Value parseDocument(const std::string& text, const std::string& name);
 
 /// Applies "a.b.c=value" as if it stood in the file.
-void override(Value& document, const std::string& assignment);
+void applyOverride(Value& document, const std::string& assignment);
 
 /// The file of a `kind` given by path or by its name in `folder`. Throws InputError, listing what
 /// there is.
@@ -70,6 +70,7 @@ class Section {
   Section(Value&& value, std::string path) = delete;
 
   bool has(std::string_view key);
+  const std::vector<std::string>& keys() const { return value_->keys; }
 
   /// A number in [lo, hi]; NaN is in no interval.
   double number(std::string_view key, double lo, double hi);

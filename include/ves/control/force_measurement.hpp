@@ -56,7 +56,7 @@ class ChannelStatistics {
 };
 
 /// What kept a calibration from being taken.
-enum class Unrest : std::int32_t { kNone, kLeg, kJoint, kChannel, kBias };
+enum class StillnessViolation : std::int32_t { kNone, kLeg, kJoint, kChannel, kBias };
 
 /// The calibration routine (report, 2.3): the bias of each channel over 100 samples at rest. Starts
 /// again whenever something moves, and gives up after kPatience samples.
@@ -73,12 +73,12 @@ class Calibration {
   Status status() const noexcept { return status_; }
   const ChannelStatistics& statistics() const noexcept { return statistics_; }
   /// Of the last movement seen: what, which (from 0), and how much [count | rad | m].
-  Unrest unrest() const noexcept { return unrest_; }
-  int unrestIndex() const noexcept { return unrest_index_; }
-  double unrestAmount() const noexcept { return unrest_amount_; }
+  StillnessViolation violation() const noexcept { return violation_; }
+  int violationIndex() const noexcept { return violation_index_; }
+  double violationAmount() const noexcept { return violation_amount_; }
 
  private:
-  void restart(Unrest what, int index, double amount) noexcept;
+  void restart(StillnessViolation what, int index, double amount) noexcept;
   bool moved(const Sample& sample) noexcept;
 
   StillnessLimits limits_;
@@ -87,9 +87,9 @@ class Calibration {
   bool has_first_ = false;
   Sample first_;
   ChannelStatistics statistics_;
-  Unrest unrest_ = Unrest::kNone;
-  int unrest_index_ = 0;
-  double unrest_amount_ = 0.0;
+  StillnessViolation violation_ = StillnessViolation::kNone;
+  int violation_index_ = 0;
+  double violation_amount_ = 0.0;
 };
 
 }  // namespace ves

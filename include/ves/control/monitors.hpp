@@ -21,7 +21,7 @@ class LegSpeed {
   Vec6 speed_ = Vec6::Zero();
 };
 
-/// Readings of the legs: one that no leg can have reached since the last is not believed; the one
+/// Readings of the legs: one that no leg can have reached since the last is not model; the one
 /// before stands. Twice in a row is a fault.
 class LegReadings {
  public:

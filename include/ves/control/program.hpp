@@ -16,7 +16,7 @@ enum class SegmentKind : std::int32_t {
   kMove,         // brakes if it must, then gently to rest at a pose
   kTrajectory,
   kAdmittance,  // from wherever the platform is, as the model's state at rest
-  kWatch,       // hold, for a look at the sensor every interval
+  kMonitor,     // hold, for a look at the sensor every interval
   kPath,        // the configuration's recorded path
   kCount
 };

@@ -33,7 +33,7 @@ enum class Check : std::uint32_t {
   kConditioning,  // near a singular pose
   kVelocity,
   kFlow,
-  kRival,  // another controller or machine is on the bus
+  kConflictingNode,  // another controller or machine is on the bus
   kCount
 };
 

@@ -43,10 +43,10 @@ class TestPlatform {
  private:
   /// F_Po_I of one tick.
   struct Wrenches {
-    Wrench total;     // measured
-    Wrench fixed;     // of gravity, the report's static wrench
-    Wrench inertial;  // of the robot's composite body, when that is compensated
-    Wrench dynamic;   // total - fixed + inertial
+    Wrench total;          // measured
+    Wrench static_wrench;  // of gravity
+    Wrench inertial;       // of the robot's composite body, when that is compensated
+    Wrench dynamic;        // total - static_wrench + inertial
   };
   PathPoint<6> nextMotion(const Wrench& dynamic) noexcept;
   Tripped safetyChecks(const Proposal& next, const Wrench& dynamic, bool conflict) const noexcept;

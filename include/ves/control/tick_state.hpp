@@ -30,8 +30,7 @@ struct TickInput {
   std::int64_t tick = 0;  // [-] counts controller periods, missed ones included
   Sample sample;          // the newest
   Order order;
-  bool rival = false;     // another controller or machine was heard since the last tick
-  bool ran_long = false;  // ticks were missed because the last one took too long; else it woke late
+  bool conflicting_node = false;  // another controller or machine was heard since the last tick
 };
 
 /// Everything one tick knew and decided.
@@ -47,24 +46,26 @@ struct TickState {
   Refusal refusal = Refusal::kNone;        // of it
   std::int64_t idle = 0;                   // [-] ticks to come of which nothing is expected
   std::int32_t age = 0;                    // [-] ticks since the sample was new
-  Wrench total, fixed, dynamic;    // F_Po_I measured; of gravity (the report's static); difference
-  Wrench inertial;                 // of the robot's composite body, left out of dynamic
-  double compensated = 0.0;        // [-] share of the compensation that is in
-  PathPoint<6> motion;             // commanded coordinates about home, rates, accelerations
-  Vec6 due = Vec6::Zero();         // coordinates that the platform should have at this very tick
-  LegMotion legs;                  // commanded
-  Vec6 reference = Vec6::Zero();   // [m] what the servos are told, so that the legs go there
-  Vec6 L_measured = Vec6::Zero();  // [m]
-  Pose measured;                   // about home, from L_measured
-  Vec6 bias = Vec6::Zero();        // [count]
+  Wrench total;                            // F_Po_I measured
+  Wrench static_wrench;                    // of gravity, the report's static wrench
+  Wrench inertial;  // of the robot's composite body, when that is compensated
+  Wrench dynamic;   // total - static_wrench + inertial: the admittance model's input
+  double compensation_share = 0.0;  // [-] of the compensation that is in
+  PathPoint<6> motion;              // commanded coordinates about home, rates, accelerations
+  Vec6 desired = Vec6::Zero();      // coordinates that the platform should have at this very tick
+  LegMotion legs;                   // commanded
+  Vec6 reference = Vec6::Zero();    // [m] what the servos are told, so that the legs go there
+  Vec6 L_measured = Vec6::Zero();   // [m]
+  Pose measured;                    // about home, from L_measured
+  Vec6 bias = Vec6::Zero();         // [count]
   Calibration::Status calibration = Calibration::Status::kNone;  // of the last one asked for
-  Unrest unrest = Unrest::kNone;                                 // what it last saw moving
-  std::int32_t unrest_index = 0;                                 // [-] which one, from 0
-  double unrest_amount = 0.0;                                    // [count | rad | m]
+  StillnessViolation violation = StillnessViolation::kNone;      // what it last saw moving
+  std::int32_t violation_index = 0;                              // [-] which one, from 0
+  double violation_amount = 0.0;                                 // [count | rad | m]
   Vec6 deviation = Vec6::Zero();                                 // [count] of a channel's samples
   Vec6 standard_error = Vec6::Zero();                            // [count] of the bias
-  bool cut_short = false;        // the program: a calibration or a start was refused
-  double slowed = 1.0;           // [-] share of the admittance model's step that was taken
+  bool aborted = false;          // the program: a calibration or a start was refused
+  double envelope_scale = 1.0;   // [-] of the admittance model's step that was taken
   std::int64_t late_ticks = 0;   // [-] so far
   Tripped tripped;               // in this tick
   Tripped latched;               // since the start

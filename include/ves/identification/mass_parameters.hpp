@@ -36,7 +36,7 @@ struct SeparableCombinations {
 SeparableCombinations separableCombinations(const RobotModel& robot);
 
 /// The sensor's reading at rest.
-struct Rest {
+struct StaticInterval {
   double t = 0.0;                       // [s] middle
   double duration = 0.0;                // [s]
   JointVector q = JointVector::Zero();  // [rad | m]
@@ -72,7 +72,7 @@ Eigen::MatrixXd countRegressor(const StaticSetup& setup, const JointVector& q, c
 /// channels weigh by their own residual. Throws std::domain_error when the rests are too few or do
 /// not determine them.
 MassEstimate estimateMasses(const StaticSetup& setup, const SeparableCombinations& combinations,
-                            const std::vector<Rest>& rests);
+                            const std::vector<StaticInterval>& rests);
 
 /// A full set of parameters that has these combinations: masses that are told only together share
 /// their sum as in `prior` (equally when it has none), and so do their first moments; what leads a

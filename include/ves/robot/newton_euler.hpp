@@ -8,17 +8,17 @@
 namespace ves {
 
 /// Motion of a body B in its own axes, gravity included as an upward acceleration of everything.
-struct FeltMotion {
+struct ProperMotion {
   Vec3 w = Vec3::Zero();      // [rad/s] w_IB_B
   Vec3 alpha = Vec3::Zero();  // [rad/s^2] alpha_IB_B
   Vec3 a = Vec3::Zero();      // [m/s^2] a_IBo_B - g_B
 };
 
 /// What the frame B, posed in P, feels when P moves as given and gravity pulls with g_I.
-FeltMotion feltMotion(const BodyMotion& P, const Transform& X_PB, const Vec3& g_I) noexcept;
+ProperMotion properMotion(const BodyMotion& P, const Transform& X_PB, const Vec3& g_I) noexcept;
 
 /// Wrench about Bo in B that must act on the body for it to move so: Newton's and Euler's equation.
-Wrench inertialWrench(const RigidBody& body, const FeltMotion& B) noexcept;
+Wrench inertialWrench(const RigidBody& body, const ProperMotion& B) noexcept;
 
 struct InverseDynamics {
   Wrench F_L0o_L0;                        // on link 0 from what it stands on
@@ -31,6 +31,6 @@ struct InverseDynamics {
 /// included, and gravity comes with the base's motion. The recursion's wrench acts *on* the robot;
 /// the sensor feels its negative.
 InverseDynamics newtonEuler(const RobotModel& robot, const JointState& q,
-                            const FeltMotion& L0) noexcept;
+                            const ProperMotion& L0) noexcept;
 
 }  // namespace ves

@@ -57,13 +57,13 @@ struct JointState {
 };
 
 /// The same body in axes A that R_AB turns to; Bo stays where it is.
-RigidBody turned(const Mat3& R_AB, const RigidBody& body_B) noexcept;
+RigidBody rotated(const Mat3& R_AB, const RigidBody& body_B) noexcept;
 
 /// [F; N] = spatialMass * [a; alpha] of Bo, for a body that does not turn yet.
 Mat6 spatialMass(const RigidBody& body) noexcept;
 
 /// The whole robot with its joints locked at q, in L0: [M_1] of (3.1).
-RigidBody locked(const RobotModel& robot, const JointVector& q) noexcept;
+RigidBody compositeBody(const RobotModel& robot, const JointVector& q) noexcept;
 
 /// Pose of link i's frame in its parent's, for joint value q.
 Transform linkPose(const Link& link, double q) noexcept;

@@ -21,11 +21,11 @@ struct RunResult {
   Phase phase = Phase::kDisarmed;
   Check cause = Check::kCount;  // of a stop; or why it never armed
   std::int64_t cause_tick = -1;
-  bool cut_short = false;  // the program could not go on: a calibration or a start was refused
-  bool let_go = false;     // asked to end before it was armed, or after a stop was reset
-  std::int64_t lost = 0;   // [-] log events and messages that could not be written or sent
+  bool aborted = false;   // the program could not go on: a calibration or a start was refused
+  bool let_go = false;    // asked to end before it was armed, or after a stop was reset
+  std::int64_t lost = 0;  // [-] log events and messages that could not be written or sent
 
-  bool good() const { return (phase == Phase::kParked && !cut_short) || let_go; }
+  bool good() const { return (phase == Phase::kParked && !aborted) || let_go; }
 };
 
 /// Called after every tick; may give an order. An order for a segment needs no id here.

@@ -72,7 +72,8 @@ void enterPrivateBus();
 /// The controller's side: the newest sample, the operator's orders, whether somebody else is there.
 ///
 /// A machine that was started anew takes the place of the old one while nothing is engaged. From
-/// then on the machine is the machine: samples of another are not let in and count as a rival.
+/// then on the machine is the machine: samples of another are not let in and count as a
+/// conflicting_node.
 class ControllerLink {
  public:
   ControllerLink(Bus& bus, const Identity& self);
@@ -83,7 +84,7 @@ class ControllerLink {
   /// The oldest order that waits; none when none does. An order that is repeated, because its
   /// sender saw no answer, counts once; a stop goes before what waits.
   Order takeOrder() noexcept;
-  bool takeRival() noexcept { return std::exchange(rival_, false); }
+  bool takeConflict() noexcept { return std::exchange(conflict_, false); }
   std::int64_t rejected() const noexcept { return rejected_; }  // [-] messages not let in
 
   void send(const leg_command_t& command) noexcept;
@@ -103,7 +104,7 @@ class ControllerLink {
   std::size_t waiting_ = 0;
   std::array<OrderId, kOrders> known_{};  // taken before, in a ring
   std::size_t next_known_ = 0;
-  bool rival_ = false;
+  bool conflict_ = false;
   std::int64_t rejected_ = 0;
 };
 

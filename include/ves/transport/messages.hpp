@@ -20,6 +20,9 @@
 
 namespace ves {
 
+/// Of all messages and of the columns of series.csv; readers refuse others.
+inline constexpr std::int32_t kSchema = 2;
+
 /// Who sends, and since when.
 struct Identity {
   std::int64_t source = 0;

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// The platform's motion in an admittance segment beside SRMS-robot's (section 4.3).
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "ves/results/series.hpp"
+#include "ves/srms/interaction.hpp"
+
+namespace ves {
+
+/// Motion of the base's tip, one point a controller period from the segment's start on.
+struct Motion {
+  std::vector<double> t;       // [s]
+  std::vector<Vec6> x, x_dot;  // [m, rad], [m/s, rad/s]
+};
+
+/// What the admittance model commanded, each state at the time it is for.
+Motion commanded(const Series& series);
+
+/// Where the platform truly was, without rates.
+Motion actual(const Series& series);
+
+Motion motion(const std::vector<InteractionPoint>& points);
+
+/// Euclidean, of position and of the fixed angles.
+struct Distance {
+  double rms_position = 0.0, peak_position = 0.0;  // [m]
+  double rms_attitude = 0.0, peak_attitude = 0.0;  // [rad]
+};
+
+/// Of two motions over the time they share.
+Distance distance(const Motion& a, const Motion& b);
+
+/// Of a motion from where it began.
+Distance travel(const Motion& motion);
+
+/// What an emulation did, and what it is for.
+struct Emulation {
+  Motion platform;  // in the first admittance segment
+  Motion base;      // the robot on its base in free space (SRMS-robot, nothing left out)
+};
+
+/// From where the platform was let go; what the modes do not express of that is left out. None
+/// without admittance control, where so many modes are kept that it would take longer than the run,
+/// and where the base's motion grows without bound.
+std::optional<Emulation> emulation(const Series& series);
+
+/// A mode of base and robot together, the robot's joints locked.
+struct CoupledMode {
+  double frequency = 0.0;      // [Hz]
+  double damping_ratio = 0.0;  // [-]
+  Vec6 shape = Vec6::Zero();   // [m, rad] at the tip
+  Eigen::RowVectorXd of_tip;   // its coordinate is of_tip * x
+};
+
+/// From A of (3.11) and the base's stiffness; damping to first order. At most six modes.
+std::vector<CoupledMode> coupledModes(const Interaction& interaction);
+
+struct RingDown {
+  double frequency = 0.0;      // [Hz] undamped
+  double damping_ratio = 0.0;  // [-]
+};
+
+/// Fits the decay of one mode that was let go at the start: straight lines through phase and log
+/// amplitude, until a twentieth is left.
+RingDown ringDown(const Motion& motion, const CoupledMode& mode);
+
+}  // namespace ves

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "ves/results/figure.hpp"
+#include "ves/validation/claims.hpp"
+
+namespace ves {
+
+/// A self-contained HTML page: style and figures inside, no script, light and dark, prints. All
+/// text is taken as text, not as HTML.
+class Page {
+ public:
+  void section(const std::string& title);
+  void text(const std::string& paragraph);
+  /// Adds the claim here, and to the table on top.
+  void claim(const Claim& claim);
+  void figure(const std::string& caption, const std::vector<Panel>& panels);
+  void table(const std::vector<std::string>& header,
+             const std::vector<std::vector<std::string>>& rows);
+
+  const std::vector<Claim>& claims() const { return claims_; }
+  std::string html(const std::string& title, const std::string& lead) const;
+
+ private:
+  std::string body_;
+  std::vector<Claim> claims_;
+  std::vector<int> section_of_claim_;
+  int sections_ = 0;
+};
+
+}  // namespace ves

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "readers.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace ves {
+namespace {
+
+Stability readStability(Section& controller, const char* key) {
+  if (!controller.has(key)) return Stability::kUnknown;
+  const std::string text = controller.choice(
+      key, {kStabilityNames[0], kStabilityNames[1], kStabilityNames[2], kStabilityNames[3]});
+  return static_cast<Stability>(
+      std::find(std::begin(kStabilityNames), std::end(kStabilityNames), text) -
+      std::begin(kStabilityNames));
+}
+
+/// What goes beyond the report; without the key all of it is off.
+Compensation readCompensation(Section& controller) {
+  Compensation c;
+  if (!controller.has("compensation")) return c;
+  Section s = controller.section("compensation");
+  c.feed_forward = s.flag("feed_forward");
+  c.observer = s.flag("observer");
+  c.inertia = s.flag("inertia");
+  if (c.inertia && !c.observer) s.fail("inertia", "needs the observer, want 'observer: true'");
+  c.mass_update = static_cast<int>(s.integer("mass_update_ticks", 1, 1'000'000));
+  c.ramp = s.number("ramp_s", 0.01, 100.0);
+  c.jitter = s.number("reading_jitter_s", 0.0, 0.1);
+  s.finish();
+  return c;
+}
+
+}  // namespace
+
+void readController(Section s, ControllerConfig& c) {
+  c.period = s.integer("period_ns", 1'000'000, 1'000'000'000);
+  c.gentle.speed = s.number("gentle_speed_m_per_s", 1e-3, 1.0);
+  c.gentle.rotation = s.number("gentle_rotation_deg_per_s", 1e-1, 100.0) * kDegree;
+  const auto braking = [&](const std::string& kind) -> Braking {
+    return {s.number(kind + "_braking_m_per_s2", 1e-3, 100.0),
+            s.number(kind + "_rotation_braking_deg_per_s2", 1e-1, 1e4) * kDegree};
+  };
+  c.gentle.braking = braking("gentle");
+  c.stop_braking = braking("stop");
+  c.arming_samples = static_cast<int>(s.integer("arming_samples", 1, 10'000));
+  c.stability = readStability(s, "stability");
+  c.stability_uncompensated = readStability(s, "stability_uncompensated");
+  c.tare_ramp = s.number("tare_ramp_s", 0.01, 100.0);
+  c.compensation = readCompensation(s);
+  Section still = s.section("still");
+  c.stillness.leg_counts = static_cast<int>(still.integer("leg_counts", 0, 1000));
+  c.stillness.joint = still.number("joint_rad_or_m", 0.0, 1.0);
+  c.stillness.deviation = still.number("deviation_counts", kTiny, 1e4);
+  c.stillness.bias = still.number("bias_v", kTiny, 10.0);  // [V] until the sensor is known
+  still.finish();
+  s.finish();
+}
+
+}  // namespace ves

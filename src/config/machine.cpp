@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "readers.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/LU>
+
+namespace ves {
+
+Legs readLegs(Section s) {
+  Legs legs;
+  legs.gains.K_P = static_cast<int>(s.integer("K_P", 1, 1'000'000));
+  legs.gains.K_D = static_cast<int>(s.integer("K_D", 0, 1'000'000));
+  constexpr double kPerMilliampere = 1e3;
+  legs.actuator.gain_extend =
+      s.number("gain_extend_in_per_s_per_ma", kTiny, 1e3) * kMetrePerInch * kPerMilliampere;
+  legs.actuator.gain_retract =
+      s.number("gain_retract_in_per_s_per_ma", kTiny, 1e3) * kMetrePerInch * kPerMilliampere;
+  legs.actuator.tau = s.number("tau_s", 1e-6, 1.0);
+  legs.actuator.length_min = s.number("stroke_min_m", 0.0, 10.0);
+  legs.actuator.length_max = s.number("stroke_max_m", legs.actuator.length_min, 10.0);
+  legs.transducer.offset = s.number("offset_m", 0.0, 10.0);
+  legs.transducer.scale = kMetrePerInch / s.number("counts_per_in", 1.0, 1e6);
+  const double reach =
+      legs.transducer.offset + legs.transducer.scale * plant::Temposonics::kMaxCount;
+  if (legs.actuator.length_min < legs.transducer.offset || legs.actuator.length_max > reach)
+    s.fail("offset_m",
+           fmt::format("the 14-bit transducer sees {:.4f} to {:.4f} m, the stroke is {} "
+                       "to {} m; want the stroke inside",
+                       legs.transducer.offset, reach, legs.actuator.length_min,
+                       legs.actuator.length_max));
+  legs.filters = s.choice("filters", {"none", "outputs"}) == "none" ? plant::LegFilters::kNone
+                                                                    : plant::LegFilters::kOutputs;
+  legs.filter_cutoff = s.number("filter_cutoff_rad_per_s", 1e-3, 1e6);
+  s.finish();
+  legs.codec.offset.setConstant(legs.transducer.offset);
+  legs.codec.scale.setConstant(legs.transducer.scale);
+  return legs;
+}
+
+Sensor readSensor(Section s) {
+  Sensor out;
+  plant::ForceTorqueSensorModel& m = out.model;
+  constexpr double kMicro = 1e-6;
+  m.S = s.matrix("sensitivity_uv_per_v", 6, 6, -1e6, 1e6) * kMicro;
+  m.excitation = s.number("excitation_v", kTiny, 100.0);
+  m.gain = s.vector("gain", 6, 1.0, 5000.0);
+  m.bias = s.vector("bias_v", 6, -10.0, 10.0);
+  m.noise = s.vector("noise_v_per_root_hz", 6, 0.0, 1.0);
+  if (!s.flag("noise")) m.noise.setZero();
+  m.cutoff = 2.0 * M_PI * s.number("cutoff_hz", 1e-3, 1e5);
+  m.volts_per_count = s.number("volts_per_count", kTiny, 1.0);
+  m.pressure = s.number("pressure_v", -10.0, 10.0);
+  m.drift = s.vector("drift_v_per_c", 6, -1.0, 1.0);
+  Section climate = s.section("temperature");
+  constexpr double kHour = 3600.0;
+  out.climate.mean = climate.number("mean_c", -50.0, 100.0);
+  out.climate.swing = climate.number("swing_c", 0.0, 50.0);
+  out.climate.period = climate.number("period_h", 1e-3, 1e5) * kHour;
+  out.climate.rising = climate.number("rising_h", -1e5, 1e5) * kHour;
+  climate.finish();
+  if (!(std::abs(m.S_proc().determinant()) > 0.0) || !m.S_proc().inverse().allFinite())
+    s.fail("sensitivity_uv_per_v", "is singular, want a matrix that has an inverse");
+  out.X_PS = {Vec3(1.0, -1.0, -1.0).asDiagonal().toDenseMatrix(),  // 180 degrees about x
+              s.vector("position_m", 3, -10.0, 10.0)};
+  out.top_plate_S = readBox(s.section("top_plate"));
+  s.finish();
+  return out;
+}
+
+/// What the machine is, beside what everybody believes: factors on the robot's masses, on its
+/// links' centres of mass, and on the servos.
+void readPlantMismatch(Section s, plant::PlantConfig& p) {
+  const auto factor = [&](const char* key, double& value) {
+    if (s.has(key)) value *= s.number(key, 0.01, 100.0);
+  };
+  factor("gain_extend", p.actuator.gain_extend);
+  factor("gain_retract", p.actuator.gain_retract);
+  factor("tau", p.actuator.tau);
+  const double mass = s.has("mass") ? s.number("mass", 0.01, 100.0) : 1.0;
+  const double center = s.has("center") ? s.number("center", 0.0, 10.0) : 1.0;
+  const auto change = [&](RigidBody& body) {
+    body = heavier(mass, body);
+    body.p_BoBcm_B *= center;
+  };
+  change(p.payload.robot.base);
+  for (int i = 0; i < p.payload.robot.joints; ++i)
+    change(p.payload.robot.links[static_cast<std::size_t>(i)].body);
+  s.finish();
+}
+
+}  // namespace ves

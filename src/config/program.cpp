@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "readers.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+#include "ves/base/coordinates.hpp"
+
+namespace ves {
+namespace {
+
+class ProgramReader {
+ public:
+  ProgramReader(const UrdfRobot* robot, Experiment& out) : robot_(robot), out_(out) {}
+
+  void read(Section& root) {
+    const std::vector<Section> items = root.list("program");
+    if (items.empty() || items.size() > kMaxSegments)
+      root.fail("program",
+                fmt::format("has {} segments, want 1 to {}", items.size(), kMaxSegments));
+    for (Section item : items) {
+      Segment& segment =
+          out_.controller.program.segments[static_cast<std::size_t>(out_.controller.program.size)];
+      readSegment(item, segment);
+      if (item.has("robot"))
+        for (Section event : item.list("robot")) readRobotEvent(event);
+      if (item.has("faults"))
+        for (Section event : item.list("faults")) readFault(event);
+      item.finish();
+      ++out_.controller.program.size;
+    }
+  }
+
+ private:
+  void readSegment(Section& item, Segment& segment) {
+    const std::string kind =
+        item.onlyKey({"calibration", "move", "trajectory", "admittance", "monitor", "path"},
+                     {"robot", "faults"});
+    Section s = item.section(kind);
+    if (kind == "calibration") {
+      segment.kind = SegmentKind::kCalibration;
+    } else if (kind == "move") {
+      segment.kind = SegmentKind::kMove;
+      if (s.has("duration_s")) segment.duration = s.number("duration_s", 0.1, 1e5);
+      if (s.has("to")) segment.target = readPose(s.section("to"));
+    } else if (kind == "trajectory") {
+      segment.kind = SegmentKind::kTrajectory;
+      segment.duration = s.number("duration_s", 0.01, 1e6);
+      for (int i = 0; i < 6; ++i) {
+        const std::string_view name = coordinate(i).name;
+        if (s.has(name))
+          segment.trajectory[static_cast<std::size_t>(i)] = readAxis(s.section(name), i);
+      }
+    } else if (kind == "monitor") {
+      segment.kind = SegmentKind::kMonitor;
+      segment.duration = s.number("duration_s", 0.01, 1e6);
+      segment.interval = s.number("interval_s", 1.0, 1e6);
+    } else if (kind == "path") {
+      segment.kind = SegmentKind::kPath;
+      readPath(s, segment);
+    } else {
+      segment.kind = SegmentKind::kAdmittance;
+      segment.duration = s.number("duration_s", 0.01, 1e6);
+    }
+    s.finish();
+  }
+
+  /// A pose a row and period: x y z [m], alpha beta gamma [deg].
+  void readPath(Section& s, Segment& segment) {
+    ControllerConfig& c = out_.controller;
+    if (c.path.cols() > 0) s.fail("rows_m_deg", "is the second path, want one at most");
+    c.path = s.matrix("rows_m_deg", -1, 6, -kAny, kAny).transpose();
+    c.path.bottomRows<3>() *= kDegree;
+    segment.duration = static_cast<double>((c.path.cols() - 1) * c.period) * kSecondPerNanosecond;
+  }
+
+  static Axis readAxis(Section s, int i) {
+    Axis axis;
+    const std::string kind = s.onlyKey({"ramp", "sine"}, {});
+    Section motion = s.section(kind);
+    if (kind == "ramp") {
+      axis.motion = AxisMotion::kRamp;
+      axis.final = readCoordinate(motion, "to", i);
+    } else {
+      axis.motion = AxisMotion::kSine;
+      axis.amplitude = readCoordinate(motion, "amplitude", i);
+      axis.frequency = motion.number("frequency_hz", 0.0, 1e3);
+    }
+    motion.finish();
+    s.finish();
+    return axis;
+  }
+
+  void readRobotEvent(Section& s) {
+    plant::RobotEvent event;
+    event.cue = {out_.controller.program.size, readTime(s, "at_s")};
+    event.move.duration = s.number("duration_s", 1e-3, 1e5);
+    const std::string joint = s.text("joint");
+    if (!robot_) s.fail("joint", fmt::format("'{}', but there is no robot", joint));
+    const auto at = std::find(robot_->joint_names.begin(), robot_->joint_names.end(), joint);
+    if (at == robot_->joint_names.end())
+      s.fail("joint",
+             fmt::format("'{}', want one of {}", joint, fmt::join(robot_->joint_names, ", ")));
+    event.move.joint = static_cast<int>(at - robot_->joint_names.begin());
+    event.move.target =
+        s.number("to_deg_or_m", -1e6, 1e6) * jointUnit(robot_->model.link(event.move.joint));
+    requireInLimits(s, "to_deg_or_m", *robot_, event.move.joint, event.move.target);
+    s.finish();
+    out_.plant.robot_events.push_back(event);
+  }
+
+  void readFault(Section& s) {
+    using plant::Fault;
+    plant::FaultEvent event;
+    event.cue = {out_.controller.program.size, readTime(s, "at_s")};
+    event.duration = readTime(s, "duration_s");
+    std::vector<std::string_view> names;
+    for (int i = 0; i < static_cast<int>(Fault::kCount); ++i)
+      names.push_back(plant::name(static_cast<Fault>(i)));
+    const std::string fault = s.text("fault");
+    const auto at = std::find(names.begin(), names.end(), fault);
+    if (at == names.end())
+      s.fail("fault", fmt::format("'{}', want one of {}", fault, fmt::join(names, ", ")));
+    event.fault = static_cast<Fault>(at - names.begin());
+    switch (event.fault) {
+      case Fault::kWrenchStep:
+      case Fault::kLegJump: event.amount = s.number("counts", -65536.0, 65536.0); [[fallthrough]];
+      case Fault::kWrenchRail:
+      case Fault::kLegFrozen:
+      case Fault::kLegOutOfRange:
+      case Fault::kValveStuck:
+      case Fault::kRunaway:  // from 1, as the legs and channels are called
+        event.index = static_cast<int>(s.integer("which", 1, 6)) - 1;
+        break;
+      case Fault::kPressure: event.amount = s.number("volts", -10.0, 10.0); break;
+      case Fault::kLate: event.amount = static_cast<double>(s.integer("samples", 1, 15)); break;
+      default: break;
+    }
+    s.finish();
+    out_.plant.faults.push_back(event);
+  }
+
+  const UrdfRobot* robot_;
+  Experiment& out_;
+};
+
+}  // namespace
+
+void readProgram(Section& root, const UrdfRobot* robot, Experiment& out) {
+  ProgramReader(robot, out).read(root);
+}
+
+}  // namespace ves

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// One reader a section of the configuration. Each takes all of its section's keys, and throws
+// InputError with the line of what is wrong.
+#pragma once
+
+#include <cmath>
+
+#include "ves/config/document.hpp"
+#include "ves/config/experiment.hpp"
+#include "ves/config/urdf.hpp"
+
+namespace ves {
+
+inline constexpr double kAny = HUGE_VAL;
+inline constexpr double kTiny = 1e-12;  // least positive value that is taken
+
+/// A coordinate of six, in its unit of configurations; the key ends with that unit.
+double readCoordinate(Section& s, const std::string& key, int i);
+Pose readPose(Section s);
+/// Nanoseconds from seconds, to the nearest.
+std::int64_t readTime(Section& s, std::string_view key);
+/// A uniform box; its centre is at the frame's origin unless `center_m` says otherwise.
+RigidBody readBox(Section s);
+
+/// platform
+Geometry readGeometry(Section s);
+
+/// legs, and legs.watchdog
+struct Legs {
+  plant::LegSlaveGains gains;
+  plant::ActuatorModel actuator;
+  plant::Temposonics transducer;
+  plant::LegFilters filters = plant::LegFilters::kNone;
+  double filter_cutoff = 0.0;
+  LegCodec codec;
+};
+Legs readLegs(Section s);
+
+/// sensor
+struct Sensor {
+  plant::ForceTorqueSensorModel model;
+  plant::Climate climate;
+  Transform X_PS;
+  RigidBody top_plate_S;
+};
+Sensor readSensor(Section s);
+
+/// safety
+SafetyLimits readSafety(Section s, double volts_per_count);
+
+/// robot
+struct Robot {
+  UrdfRobot urdf;
+  Transform X_PR, X_RL0;
+  RigidBody adapter_R;
+  JointVector q = JointVector::Zero();
+};
+Robot readRobot(Section s, const Value& document);
+double jointUnit(const Link& link);
+/// Fails at `key` unless the joint may be at q [rad | m].
+void requireInLimits(const Section& s, std::string_view key, const UrdfRobot& robot, int joint,
+                     double q);
+
+/// controller, into `c`
+void readController(Section s, ControllerConfig& c);
+
+/// program, with the events of robot and faults; `robot` is null where there is none
+void readProgram(Section& root, const UrdfRobot* robot, Experiment& out);
+
+/// plant_mismatch
+void readPlantMismatch(Section s, plant::PlantConfig& p);
+
+}  // namespace ves

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/results/comparison.hpp"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "ves/srms/modes.hpp"
+
+namespace ves {
+namespace {
+
+/// Calls take(row, seconds since the first tick) in every tick of the first admittance segment.
+template <class Take>
+void eachTick(const Series& series, const Take& take) {
+  const double* start = nullptr;
+  int segment = -1;
+  for (const Row& row : series.rows) {
+    if (row.state.phase != static_cast<int>(Phase::kRunning) ||
+        row.state.kind != static_cast<int>(SegmentKind::kAdmittance))
+      continue;
+    if (!start) {
+      start = &row.t;
+      segment = row.state.segment;
+    }
+    if (row.state.segment == segment) take(row, row.t - *start);
+  }
+}
+
+}  // namespace
+
+Motion commanded(const Series& series) {
+  const double period =
+      static_cast<double>(series.experiment.controller.period) * kSecondPerNanosecond;
+  Motion out;
+  eachTick(series, [&](const Row& row, double t) {
+    if (out.t.empty()) {  // where it starts from, at rest
+      out.t.push_back(0.0);
+      out.x.push_back(Vec6::Map(row.state.x_desired));
+      out.x_dot.push_back(Vec6::Zero());
+    }
+    out.t.push_back(t + period);
+    out.x.push_back(Vec6::Map(row.state.x));
+    out.x_dot.push_back(Vec6::Map(row.state.x_dot));
+  });
+  return out;
+}
+
+Motion actual(const Series& series) {
+  Motion out;
+  eachTick(series, [&](const Row& row, double t) {
+    if (!row.has_truth) return;
+    out.t.push_back(t);
+    out.x.push_back(Vec6::Map(row.truth.x));
+  });
+  return out;
+}
+
+std::optional<Emulation> emulation(const Series& series) {
+  constexpr Eigen::Index kMostModes = 12;
+  const Experiment& e = series.experiment;
+  if (!wantsAdmittance(e.controller.program) ||
+      e.controller.admittance.stiffness.size() > kMostModes)
+    return {};
+  Emulation out;
+  out.platform = actual(series);
+  if (out.platform.x.size() < 2) return {};
+  InteractionOptions options;
+  options.model = InteractionModel::kWhole;
+  options.step = e.controller.period;
+  const Interaction interaction = interactionOf(e, options.duration);
+  const Vec6 start = commanded(series).x.front();
+  options.eta = interaction.base.Phi.completeOrthogonalDecomposition().solve(start);
+  options.eta_dot = Eigen::VectorXd::Zero(options.eta.size());
+  const Vec6 rest = start - interaction.base.Phi * options.eta;
+  for (Vec6& x : out.platform.x) x -= rest;
+  try {
+    out.base = motion(simulate(interaction, options));
+  } catch (const std::domain_error&) {
+    return {};
+  }
+  return out;
+}
+
+Motion motion(const std::vector<InteractionPoint>& points) {
+  Motion out;
+  for (const InteractionPoint& p : points) {
+    out.t.push_back(p.t);
+    out.x.push_back(p.x);
+    out.x_dot.push_back(p.x_dot);
+  }
+  return out;
+}
+
+Distance distance(const Motion& a, const Motion& b) {
+  Distance d;
+  const std::size_t n = std::min(a.x.size(), b.x.size());
+  for (std::size_t i = 0; i < n; ++i) {
+    const double p = (a.x[i] - b.x[i]).head<3>().norm(), r = (a.x[i] - b.x[i]).tail<3>().norm();
+    d.rms_position += p * p / static_cast<double>(n);
+    d.rms_attitude += r * r / static_cast<double>(n);
+    d.peak_position = std::max(d.peak_position, p);
+    d.peak_attitude = std::max(d.peak_attitude, r);
+  }
+  d.rms_position = std::sqrt(d.rms_position);
+  d.rms_attitude = std::sqrt(d.rms_attitude);
+  return d;
+}
+
+Distance travel(const Motion& motion) {
+  Motion still = motion;
+  std::fill(still.x.begin(), still.x.end(), motion.x.empty() ? Vec6::Zero() : motion.x.front());
+  return distance(motion, still);
+}
+
+std::vector<CoupledMode> coupledModes(const Interaction& interaction) {
+  const ModalModel& base = interaction.base;
+  const RigidBody robot = combine(RigidBody{}, interaction.payload.X_PL0(),
+                                  compositeBody(carried(interaction.payload), interaction.q0));
+  const Eigen::MatrixXd A = augmentedModalMass(base, robot);
+  const Eigenmodes modes = eigenmodes(A, base.stiffness.asDiagonal());
+  // xi = V^T A eta, eta = Phi^+ x
+  const Eigen::MatrixXd to_modes =
+      modes.shapes.transpose() * A * base.Phi.completeOrthogonalDecomposition().pseudoInverse();
+  std::vector<CoupledMode> out;
+  for (Eigen::Index j = 0; j < modes.stiffness.size(); ++j) {
+    const Eigen::VectorXd v = modes.shapes.col(j);
+    const double omega = std::sqrt(modes.stiffness(j));
+    out.push_back({omega / (2.0 * M_PI), v.dot(base.damping * v) / (2.0 * omega), base.Phi * v,
+                   to_modes.row(j)});
+  }
+  return out;
+}
+
+RingDown ringDown(const Motion& motion, const CoupledMode& mode) {
+  double turn = 2.0 * M_PI * mode.frequency, decay = 0.0;
+  for (int pass = 0; pass < 6; ++pass) {
+    // xi = a e^{-decay t} cos(turn t + p), and its quadrature, which needs both.
+    double n = 0, t1 = 0, t2 = 0, a1 = 0, at = 0, p1 = 0, pt = 0, phase = 0, first = 0;
+    for (std::size_t i = 0; i < motion.t.size(); ++i) {
+      const double xi = mode.of_tip.dot(motion.x[i]);
+      const double other = -(mode.of_tip.dot(motion.x_dot[i]) + decay * xi) / turn;
+      const double size = std::hypot(xi, other);
+      if (i == 0) first = size;
+      if (size < 0.05 * first) break;
+      const double now = std::atan2(other, xi);
+      phase = n > 0 ? phase + std::remainder(now - phase, 2.0 * M_PI) : now;
+      const double t = motion.t[i], a = std::log(size);
+      n += 1;
+      t1 += t, t2 += t * t, a1 += a, at += a * t, p1 += phase, pt += phase * t;
+    }
+    const double spread = n * t2 - t1 * t1;
+    decay = -(n * at - t1 * a1) / spread;
+    turn = (n * pt - t1 * p1) / spread;
+  }
+  return {std::hypot(turn, decay) / (2.0 * M_PI), decay / std::hypot(decay, turn)};
+}
+
+}  // namespace ves

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/results/figure.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <regex>
+#include <sstream>
+#include <utility>
+
+#include "ves/results/gnuplot.hpp"
+
+namespace ves {
+namespace {
+
+constexpr std::size_t kMostPoints = 700;  // [-] of a line: more than it has pixels
+
+/// Lines thinned by keeping the extremes of each run of points, so that no peak is lost.
+std::string data(const Line& line) {
+  std::string out;
+  const std::size_t n = line.x.size();
+  const std::size_t bin = n <= kMostPoints ? 1 : (2 * n + kMostPoints - 1) / kMostPoints;
+  for (std::size_t i = 0; i < n; i += bin) {
+    std::size_t low = i, high = i;
+    for (std::size_t k = i; k < std::min(n, i + bin); ++k) {
+      if (line.y[k] < line.y[low]) low = k;
+      if (line.y[k] > line.y[high]) high = k;
+    }
+    for (const std::size_t k : {std::min(low, high), std::max(low, high)}) {
+      out += fmt::format("{:.6g} {:.6g}\n", line.x[k], line.y[k]);
+      if (low == high) break;
+    }
+  }
+  return out;
+}
+
+std::pair<double, double> range(const Panel& panel) {
+  double low = HUGE_VAL, high = -HUGE_VAL;
+  for (const Line& line : panel.lines)
+    for (const double y : line.y) {
+      low = std::min(low, y);
+      high = std::max(high, y);
+    }
+  return low <= high ? std::pair(low, high) : std::pair(0.0, 0.0);
+}
+
+void replaceAll(std::string& text, const std::string& from, const std::string& to) {
+  for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size())
+    text.replace(at, from.size(), to);
+}
+
+}  // namespace
+
+std::string svg(const std::vector<Panel>& panels) {
+  const std::size_t columns = std::min<std::size_t>(2, panels.size());
+  const std::size_t rows = (panels.size() + columns - 1) / columns;
+  const double height = 250.0 * static_cast<double>(rows);
+  std::string script = fmt::format(
+      "set terminal svg noenhanced size {},{} font 'sans-serif,12'\nset output 'figure.svg'\n"
+      "set multiplot layout {},{} margins {},0.99,{},{} spacing {},{}\n"
+      "set grid lc rgb '#808080' lw 0.4 dt 1\nset border 3\nset tics nomirror\n"
+      "set key top right horizontal samplen 2 width 1\n",
+      columns == 1 ? 520 : 960, height, rows, columns, columns == 1 ? 0.13 : 0.075, 52.0 / height,
+      1.0 - 12.0 / height, 0.1, 62.0 / height);
+  for (std::size_t p = 0; p < panels.size(); ++p) {
+    const Panel& panel = panels[p];
+    script += fmt::format("{}\nset xlabel {}\nset ylabel {}\n",
+                          panel.log_x ? "set logscale x\nset autoscale xfix" : "unset logscale x",
+                          quoted(panel.x_label), quoted(panel.y_label));
+    const auto [low, high] = range(panel);
+    const double span = high > low ? high - low : 1.0;  // room for the key above
+    script += fmt::format("set yrange [{}:{}]\n", low - 0.05 * span, high + 0.16 * span);
+    std::string plot;
+    for (std::size_t i = 0; i < panel.lines.size(); ++i) {
+      const Line& line = panel.lines[i];
+      const std::string block = fmt::format("$p{}_{}", p, i);
+      script += fmt::format("{} << EOD\n{}EOD\n", block, data(line));
+      plot += fmt::format("{}{} using 1:2 with lines lw {} dt {} lc rgb '{}' {}",
+                          plot.empty() ? "plot " : ", ", block, line.dashed ? 1.3 : 1.8,
+                          line.dashed ? 2 : 1, kColour[line.colour],
+                          line.name.empty() ? "notitle" : "title " + quoted(line.name));
+    }
+    script += plot + "\n";
+  }
+  script += "unset multiplot\nunset output\n";
+
+  const std::filesystem::path folder =
+      std::filesystem::temp_directory_path() / fmt::format("ves-figure-{}", getpid());
+  std::filesystem::create_directories(folder);
+  gnuplot(script, folder);
+  std::ostringstream text;
+  text << std::ifstream(folder / "figure.svg").rdbuf();
+  std::filesystem::remove_all(folder);
+  std::string out = text.str();
+  if (out.find("</svg>") == std::string::npos) return "<p>(gnuplot could not draw this figure)</p>";
+
+  out.erase(0, out.find("<svg"));
+  out = std::regex_replace(out, std::regex("<title>[^<]*</title>\\s*|<desc>[^<]*</desc>\\s*"), "");
+  out.erase(out.find("<defs>"), out.find("</defs>") + 7 - out.find("<defs>"));
+  out = std::regex_replace(
+      out, std::regex(" id=\"[^\"]*\"| (width|height)=\"\\d+\"(?=[^>]*viewBox)"), "");
+  out = std::regex_replace(out, std::regex("<g [^>]*>\\s*</g>\\s*"), "");
+  const char* const ink[][2] = {{"stroke='black'", "class=\"ink\""},
+                                {"fill=\"black\"", "class=\"ink-text\""},
+                                {"stroke='rgb(  0, 114, 178)'", "class=\"c0\""},
+                                {"stroke='rgb(213,  94,   0)'", "class=\"c1\""},
+                                {"stroke='rgb(  0, 158, 115)'", "class=\"c2\""},
+                                {"stroke='rgb(128, 128, 128)'", ""}};
+  for (const auto& [from, to] : ink) replaceAll(out, from, to);
+  return out;
+}
+
+}  // namespace ves

@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/results/plots.hpp"
+
+#include <fmt/format.h>
+
+#include "ves/base/coordinates.hpp"
+#include "ves/results/drift_samples.hpp"
+#include "ves/results/gnuplot.hpp"
+
+namespace ves {
+namespace {
+
+constexpr double kShownLength = 1e3;  // [mm/m]
+
+struct Span {
+  double from, to;  // [s]
+};
+
+struct Curve {
+  std::string formula;  // gnuplot, of the columns of series.csv
+  std::string title;
+  std::string colour;
+  bool dashed = false;
+};
+
+std::string scaled(const std::string& column, double factor) {
+  return fmt::format("column('{}')*{}", column, factor);
+}
+
+/// A picture of panels, as a gnuplot script.
+class Page {
+ public:
+  Page(const std::string& file, const std::string& title, Span span, int rows, int cols)
+      : panels_(rows * cols), cols_(cols) {
+    script_ = fmt::format(
+        "reset\nset datafile separator ','\nset datafile columnheaders\n"
+        "set terminal pngcairo noenhanced size 1500,{} font 'DejaVu Sans,12' background '#ffffff'\n"
+        "set output {}\n"
+        "set multiplot layout {},{} title {} font 'DejaVu Sans,13' margins 0.06,0.985,{},0.90 "
+        "spacing 0.06,0.09\n"
+        "set grid lc rgb '#cccccc' lw 1 dt 1\nset border 3 lc rgb '#555555'\nset tics nomirror\n"
+        "set key top right horizontal samplen 2 width 3 font 'DejaVu Sans,11'\nset xrange [{}:{}]\n"
+        "set offsets graph 0,0,0.18,0.05\n",
+        rows == 1 ? 480 : 800, quoted(file), rows, cols, quoted(title), rows == 1 ? 0.14 : 0.085,
+        span.from, span.to);
+  }
+
+  void panel(const std::string& ylabel, const std::vector<Curve>& curves) {
+    const bool bottom = ++drawn_ > panels_ - cols_;
+    script_ += fmt::format("set ylabel {} offset 1\nset xlabel {}\nplot ", quoted(ylabel),
+                           quoted(bottom ? "time [s]" : ""));
+    for (std::size_t i = 0; i < curves.size(); ++i)
+      script_ += fmt::format(
+          "{}'series.csv' using (column('t_s')):({}) with lines lw {} dt {} lc rgb '{}' title {}",
+          i ? ", " : "", curves[i].formula, curves[i].dashed ? 1.5 : 2.0, curves[i].dashed ? 2 : 1,
+          curves[i].colour, quoted(curves[i].title));
+    script_ += "\n";
+  }
+
+  std::string script() const { return script_ + "unset multiplot\nunset output\n"; }
+
+ private:
+  std::string script_;
+  int panels_, cols_, drawn_ = 0;
+};
+
+bool in(const Row& row, Phase phase) { return row.state.phase == static_cast<int>(phase); }
+
+/// What the sensor reads over hours (figures 4.2 and 4.3).
+std::string driftPage(const std::vector<DriftSample>& samples, const std::string& title) {
+  std::string data = "$samples << EOD\n";
+  for (const DriftSample& sample : samples) {
+    data += fmt::format("{} {}", sample.t / 3600.0, sample.temperature);
+    for (double w : sample.wrench) data += fmt::format(" {}", w);
+    data += "\n";
+  }
+  std::string script =
+      "reset\n" + data + "EOD\n" +
+      fmt::format(
+          "set terminal pngcairo noenhanced size 1500,900 font 'DejaVu Sans,12' background "
+          "'#ffffff'\nset output 'drift.png'\n"
+          "set multiplot layout 3,1 title {} font 'DejaVu Sans,13' margins 0.06,0.985,0.07,0.93 "
+          "spacing 0.06,0.06\n"
+          "set grid lc rgb '#cccccc' lw 1 dt 1\nset border 3 lc rgb '#555555'\nset tics nomirror\n"
+          "set key top right horizontal samplen 2 width 3 font 'DejaVu Sans,11'\n"
+          "set xtics 12\nset offsets graph 0,0,0.25,0.05\n",
+          quoted(title));
+  const auto panel = [&](const char* ylabel, const char* xlabel, int first, int count, bool names) {
+    script +=
+        fmt::format("set ylabel {} offset 1\nset xlabel {}\nplot ", quoted(ylabel), quoted(xlabel));
+    for (int i = 0; i < count; ++i)
+      script +=
+          fmt::format("{}$samples using 1:{} with linespoints pt 7 ps 0.5 lw 1.5 lc rgb '{}' {}",
+                      i ? ", " : "", first + i, kColour[i],
+                      names ? "title " + quoted(std::string(wrenchComponent(first - 3 + i).name))
+                            : std::string("notitle"));
+    script += "\n";
+  };
+  panel("force [N]", "", 3, 3, true);
+  panel("moment [N m]", "", 6, 3, true);
+  panel("temperature [C]", "time [h]", 2, 1, false);
+  return script + "unset multiplot\nunset output\n";
+}
+
+/// The pictures that gnuplot has drawn.
+std::vector<std::filesystem::path> draw(const std::string& script,
+                                        const std::vector<std::string>& files,
+                                        const std::filesystem::path& folder) {
+  gnuplot(script, folder);
+  std::vector<std::filesystem::path> drawn;
+  for (const std::string& file : files) {
+    std::error_code none;
+    if (std::filesystem::exists(folder / file, none)) drawn.push_back(folder / file);
+  }
+  return drawn;
+}
+
+}  // namespace
+
+std::vector<std::filesystem::path> drawPlots(const Series& series,
+                                             const std::filesystem::path& folder) {
+  if (series.rows.empty()) return {};
+  const Experiment& experiment = series.experiment;
+  if (const auto drift = driftSamples(series); drift.size() > 2)
+    return draw(driftPage(drift, experiment.name + ": the sensor's mean over each sample"),
+                {"drift.png"}, folder);
+  // The program, not the wait before it; wrenches only once the sensor's bias is known.
+  Span program{0.0, series.rows.back().t}, calibrated{-1.0, program.to};
+  bool waiting = true;
+  for (const Row& row : series.rows) {
+    if (waiting && !in(row, Phase::kDisarmed)) {
+      program.from = row.t;
+      waiting = false;
+    }
+    if (row.state.kind == static_cast<int>(SegmentKind::kCalibration))
+      calibrated.from = row.t + 2.0 * static_cast<double>(experiment.controller.period) *
+                                    kSecondPerNanosecond;  // the bias counts from the next tick
+  }
+
+  const auto name = [](int i, const char* what) {
+    return fmt::format("{}_{}_{}", coordinate(i).name, what, coordinate(i).unit);
+  };
+  std::string script;
+  std::vector<std::string> files;
+  const auto finish = [&](const std::string& file, const Page& page) {
+    files.push_back(file);
+    script += page.script();
+  };
+
+  Page pose("pose.png", experiment.name + ": pose of the platform, from home", program, 2, 3);
+  for (int i = 0; i < 6; ++i) {
+    const double scale = coordinate(i).shown;
+    pose.panel(fmt::format("{} [{}]", coordinate(i).name, coordinate(i).shown_unit),
+               {{scaled(name(i, "actual"), scale), "actual", kColour[0], false},
+                {scaled(name(i, "desired"), scale), "commanded", kColour[1], true}});
+  }
+  finish("pose.png", pose);
+
+  Page error("error.png", experiment.name + ": commanded minus actual pose", program, 1, 2);
+  for (int half = 0; half < 2; ++half) {
+    std::vector<Curve> curves;
+    for (int i = 3 * half; i < 3 * half + 3; ++i)
+      curves.push_back({fmt::format("(column('{}')-column('{}'))*{}", name(i, "desired"),
+                                    name(i, "actual"), coordinate(i).shown),
+                        std::string(coordinate(i).name), kColour[i % 3], false});
+    error.panel(half ? "orientation error [deg]" : "position error [mm]", curves);
+  }
+  finish("error.png", error);
+
+  if (calibrated.from >= 0.0) {
+    Page wrench("wrench.png",
+                experiment.name + ": wrench on the platform, gravity compensated, about {P} in {I}",
+                calibrated, 1, 2);
+    for (int half = 0; half < 2; ++half) {
+      std::vector<Curve> curves;
+      for (int i = 3 * half; i < 3 * half + 3; ++i)
+        curves.push_back({fmt::format("column('{}_dynamic_{}')", wrenchComponent(i).name,
+                                      wrenchComponent(i).unit),
+                          std::string(wrenchComponent(i).name), kColour[i % 3], false});
+      wrench.panel(half ? "moment [N m]" : "force [N]", curves);
+    }
+    finish("wrench.png", wrench);
+  }
+
+  Page legs("legs.png", experiment.name + ": leg lengths", program, 2, 3);
+  for (int i = 1; i <= kLegs; ++i)
+    legs.panel(
+        fmt::format("leg {} [mm]", i),
+        {{scaled(fmt::format("leg{}_measured_m", i), kShownLength), "measured", kColour[0], false},
+         {scaled(fmt::format("leg{}_commanded_m", i), kShownLength), "commanded", kColour[1],
+          true}});
+  finish("legs.png", legs);
+
+  return draw(script, files, folder);
+}
+
+}  // namespace ves

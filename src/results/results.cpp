@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/results/results.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "ves/realtime/realtime.hpp"
+#include "ves/results/plots.hpp"
+#include "ves/results/summary.hpp"
+
+namespace ves {
+
+std::filesystem::path makeFolder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error || !std::filesystem::is_directory(folder, error))
+    throw InputError(fmt::format("--out {}: cannot be a folder: {}", folder.string(),
+                                 error ? error.message() : "something else is there"));
+  return std::filesystem::absolute(folder);
+}
+
+std::string writeResults(const std::filesystem::path& folder, const RunResult& result, bool plots) {
+  const Series series = readSeries((folder / "run.lcmlog").string());
+  writeCsv(series, (folder / "series.csv").string());
+  const auto summary = summarise(series, result);
+  writeSummary(summary, (folder / "summary.json").string());
+  std::string out = table(summary) + "\n";
+  std::string files = "run.lcmlog, series.csv, summary.json";
+  if (plots)
+    for (const std::filesystem::path& plot : drawPlots(series, folder))
+      files += ", " + plot.filename().string();
+  const std::filesystem::path here = folder.lexically_relative(std::filesystem::current_path());
+  const bool below = !here.empty() && *here.begin() != "..";
+  return out + fmt::format("  {}\n    {}\n", (below ? here : folder).string(), files);
+}
+
+void Progress::show(Phase phase, int segment, std::int64_t tick, const double (&x)[6]) {
+  constexpr std::int64_t kRefresh = 100'000'000;  // [ns]
+  const std::int64_t now = monotonicNow();
+  const bool changed = phase != phase_ || segment != segment_;
+  const bool terminal = isatty(STDERR_FILENO);
+  if (!changed && (!terminal || now - shown_at_ < kRefresh)) return;
+  if (changed && open_) end();
+  shown_at_ = now;
+  phase_ = phase;
+  segment_ = segment;
+  std::string what(name(phase));
+  if (phase == Phase::kRunning && segment >= 0 && segment < experiment_.controller.program.size)
+    what = fmt::format(
+        "{} ({} of {})",
+        name(experiment_.controller.program.segments[static_cast<std::size_t>(segment)].kind),
+        segment + 1, experiment_.controller.program.size);
+  const double t = static_cast<double>(tick * experiment_.controller.period) * kSecondPerNanosecond;
+  fmt::print(stderr,
+             "{}{:7.2f} s  {:<24} x {:+6.1f}  y {:+6.1f}  z {:+6.1f} mm   alpha {:+6.2f}  beta "
+             "{:+6.2f}  gamma {:+6.2f} deg{}",
+             terminal ? "\r" : "", t, what, x[0] * 1e3, x[1] * 1e3, x[2] * 1e3, x[3] / kDegree,
+             x[4] / kDegree, x[5] / kDegree, terminal ? "" : "\n");
+  open_ = terminal;
+}
+
+void Progress::end() {
+  if (open_) fmt::print(stderr, "\n");
+  open_ = false;
+}
+
+}  // namespace ves

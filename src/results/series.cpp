@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/results/series.hpp"
+
+#include <fmt/format.h>
+#include <fmt/os.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <iterator>
+#include <utility>
+
+#include "ves/base/coordinates.hpp"
+#include "ves/transport/channels.hpp"
+#include "ves/transport/fields.hpp"
+
+namespace ves {
+std::optional<Row> RowMaker::add(const LogEvent& event, const std::string& log) {
+  if (event.channel == channel::kTruth) {
+    const auto truth = event.require<truth_t>(log);
+    truths_.put(truth.header.sequence, truth);
+  } else if (event.channel == channel::kSample) {
+    const auto sample = event.require<sample_t>(log);
+    samples_.put(sample.header.sequence, sample);
+  } else if (event.channel == channel::kTiming && row_) {
+    row_->timing = event.require<timing_t>(log);
+    row_->has_timing = true;
+  } else if (event.channel == channel::kState) {
+    Row row;
+    row.state = event.require<state_t>(log);
+    if (!start_) start_ = row.state.header.time_ns;
+    row.t = static_cast<double>(row.state.header.time_ns - *start_) * kSecondPerNanosecond;
+    const auto take = [&](const auto& from, auto& to, bool& has) {
+      const auto* message = from.find(row.state.sample_sequence);
+      has = message != nullptr;
+      if (message) to = *message;
+    };
+    take(truths_, row.truth, row.has_truth);
+    take(samples_, row.sample, row.has_sample);
+    return std::exchange(row_, row);
+  }
+  return {};
+}
+
+Series readSeries(const std::string& log) {
+  Series series;
+  bool configured = false;
+  RowMaker rows;
+  LogReader reader(log);
+  LogEvent event;
+  while (reader.next(event)) {
+    if (event.channel == channel::kExperiment && !configured) {
+      const auto message = event.require<experiment_t>(log);
+      series.experiment = parseExperiment(message.resolved, log + ":configuration");
+      series.version = message.version;
+      configured = true;
+    }
+    if (const auto row = rows.add(event, log)) series.rows.push_back(*row);
+  }
+  if (const auto row = rows.finish()) series.rows.push_back(*row);
+  if (!configured)
+    throw InputError(
+        fmt::format("{}: no configuration in this log (channel {})", log, channel::kExperiment));
+  return series;
+}
+
+namespace {
+
+/// Every single number of a state that has no column of its own yet.
+void addScalars(std::vector<Column>& out) {
+  const state_t prototype{};
+  forEachField(prototype, [&](const std::string& name, const auto& field) {
+    using T = std::remove_cvref_t<decltype(field)>;
+    const bool known = std::any_of(out.begin(), out.end(), [&](const Column& c) {
+      return c.name == name || c.name == name + "_bits";
+    });
+    if constexpr (!std::is_array_v<T>) {
+      const auto offset =
+          reinterpret_cast<const char*>(&field) - reinterpret_cast<const char*>(&prototype);
+      if (!known)
+        out.push_back({name, [offset](const Row& r) {
+                         T value;
+                         std::memcpy(&value, reinterpret_cast<const char*>(&r.state) + offset,
+                                     sizeof value);
+                         return static_cast<double>(value);
+                       }});
+    }
+  });
+}
+
+}  // namespace
+
+std::vector<Column> columns(const Experiment& experiment) {
+  std::vector<Column> out;
+  const auto add = [&](std::string name, auto value) { out.push_back({std::move(name), value}); };
+  const auto addPose = [&](const char* what, const char* per, const double(state_t::*field)[6]) {
+    for (int i = 0; i < 6; ++i)
+      add(fmt::format("{}_{}_{}{}", coordinate(i).name, what, coordinate(i).unit, per),
+          [=](const Row& r) { return (r.state.*field)[i]; });
+  };
+  const auto addWrench = [&](const char* what, const double(state_t::*field)[6]) {
+    for (int i = 0; i < 6; ++i)
+      add(fmt::format("{}_{}_{}", wrenchComponent(i).name, what, wrenchComponent(i).unit),
+          [=](const Row& r) { return (r.state.*field)[i]; });
+  };
+  const auto addChannels = [&](const char* what, const double(state_t::*field)[6]) {
+    for (int i = 0; i < 6; ++i)
+      add(fmt::format("{}_{}_count", wrenchComponent(i).name, what),
+          [=](const Row& r) { return (r.state.*field)[i]; });
+  };
+  const auto addLegs = [&](const char* what, const char* unit, const double(state_t::*field)[6]) {
+    for (int i = 0; i < 6; ++i)
+      add(fmt::format("leg{}_{}_{}", i + 1, what, unit),
+          [=](const Row& r) { return (r.state.*field)[i]; });
+  };
+
+  add("t_s", [](const Row& r) { return r.t; });
+  add("tick", [](const Row& r) { return static_cast<double>(r.state.header.sequence); });
+  add("phase", [](const Row& r) { return static_cast<double>(r.state.phase); });
+  add("segment", [](const Row& r) { return static_cast<double>(r.state.segment); });
+  addPose("commanded", "", &state_t::x);
+  addPose("commanded_rate", "_per_s", &state_t::x_dot);
+  addPose("commanded_acceleration", "_per_s2", &state_t::x_ddot);
+  addPose("desired", "", &state_t::x_desired);
+  addPose("measured", "", &state_t::x_measured);
+  for (int i = 0; i < 6; ++i)
+    add(fmt::format("{}_actual_{}", coordinate(i).name, coordinate(i).unit),
+        [=](const Row& r) { return r.has_truth ? r.truth.x[i] : NAN; });
+  addWrench("total", &state_t::total);
+  addWrench("static", &state_t::static_wrench);
+  addWrench("inertial", &state_t::inertial);
+  addWrench("dynamic", &state_t::dynamic);
+  addLegs("commanded", "m", &state_t::leg);
+  addLegs("commanded_rate", "m_per_s", &state_t::leg_dot);
+  addLegs("commanded_acceleration", "m_per_s2", &state_t::leg_ddot);
+  addLegs("reference", "m", &state_t::reference);
+  addLegs("measured", "m", &state_t::leg_measured);
+  for (int i = 0; i < static_cast<int>(experiment.joint_names.size()); ++i)
+    add(fmt::format(
+            "{}_{}", experiment.joint_names[static_cast<std::size_t>(i)],
+            experiment.controller.payload.robot.link(i).type == JointType::kRevolute ? "rad" : "m"),
+        [=](const Row& r) { return r.has_sample ? r.sample.q[i] : NAN; });
+  addChannels("bias", &state_t::bias);
+  addChannels("deviation", &state_t::deviation);
+  addChannels("standard_error", &state_t::standard_error);
+  for (int i = 0; i < 6; ++i)
+    add(fmt::format("leg{}_command_count", i + 1),
+        [=](const Row& r) { return static_cast<double>(r.state.counts[i]); });
+  add("temperature_c", [](const Row& r) { return r.has_sample ? r.sample.temperature : NAN; });
+  add("tripped_bits", [](const Row& r) { return static_cast<double>(r.state.tripped); });
+  add("latched_bits", [](const Row& r) { return static_cast<double>(r.state.latched); });
+  addScalars(out);
+  add("late_s", [](const Row& r) {
+    return r.has_timing ? static_cast<double>(r.timing.late_ns) * kSecondPerNanosecond : NAN;
+  });
+  add("compute_s", [](const Row& r) {
+    return r.has_timing ? static_cast<double>(r.timing.compute_ns) * kSecondPerNanosecond : NAN;
+  });
+  return out;
+}
+
+bool selected(const std::string& name, const std::vector<std::string>& select,
+              std::vector<bool>& used) {
+  bool take = select.empty() || name == "t_s";
+  for (std::size_t i = 0; i < select.size(); ++i)
+    if (name.rfind(select[i], 0) == 0) take = used[i] = true;
+  return take;
+}
+
+std::string csvHeader(const std::vector<Column>& columns) {
+  std::string line;
+  for (const Column& column : columns) line += (line.empty() ? "" : ",") + column.name;
+  return line;
+}
+
+std::string csvRow(const std::vector<Column>& columns, const Row& row) {
+  std::string line;
+  for (const Column& column : columns)
+    fmt::format_to(std::back_inserter(line), "{}{}", line.empty() ? "" : ",", column.value(row));
+  return line;
+}
+
+void writeCsv(const Series& series, const std::string& file) {
+  try {
+    auto out = fmt::output_file(file);
+    const std::vector<Column> all = columns(series.experiment);
+    out.print("{}\n", csvHeader(all));
+    for (const Row& row : series.rows) out.print("{}\n", csvRow(all, row));
+  } catch (const std::system_error& error) {
+    throw InputError(fmt::format("{}: cannot be written: {}", file, error.what()));
+  }
+}
+
+}  // namespace ves

@@ -1,0 +1,325 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/results/summary.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <utility>
+
+#include "ves/base/coordinates.hpp"
+#include "ves/realtime/latency.hpp"
+#include "ves/results/comparison.hpp"
+#include "ves/results/drift_samples.hpp"
+
+namespace ves {
+namespace {
+
+constexpr double kStill = 0.5;   // [s] without commanded motion: the sensor's filter has settled
+constexpr double kMoved = 1e-6;  // [m | rad] least range of a coordinate that counts as moving
+
+bool running(const Row& row) { return row.state.phase == static_cast<int>(Phase::kRunning); }
+
+SegmentKind kindOf(const Row& row) { return static_cast<SegmentKind>(row.state.kind); }
+
+/// Trajectory and admittance segments: what the experiment is about.
+bool measured(const Row& row) {
+  const SegmentKind kind = kindOf(row);
+  return running(row) && row.has_truth &&
+         (kind == SegmentKind::kTrajectory || kind == SegmentKind::kAdmittance ||
+          kind == SegmentKind::kPath);
+}
+
+struct Tracking {
+  double low = HUGE_VAL, high = -HUGE_VAL;  // of where it should be
+  double rising = 0.0, falling = 0.0;       // largest error with the rate positive, negative
+  double sum_e2 = 0.0, sum_ev = 0.0, sum_v2 = 0.0;
+  std::int64_t n = 0;
+
+  void add(double due, double actual, double rate) {
+    const double e = due - actual;
+    low = std::min(low, due);
+    high = std::max(high, due);
+    if (rate > 0.0) rising = std::max(rising, std::abs(e));
+    if (rate < 0.0) falling = std::max(falling, std::abs(e));
+    sum_e2 += e * e;
+    sum_ev += e * rate;
+    sum_v2 += rate * rate;
+    ++n;
+  }
+  double rms() const { return std::sqrt(sum_e2 / static_cast<double>(n)); }
+  /// The delay that explains most of the error: e = lag * rate, least squares.
+  double lag() const { return sum_ev / sum_v2; }
+};
+
+void addTracking(const Series& series, nlohmann::ordered_json& out) {
+  Tracking tracking[6];
+  for (const Row& row : series.rows)
+    if (measured(row))
+      for (int i = 0; i < 6; ++i)
+        tracking[i].add(row.state.x_desired[i], row.truth.x[i], row.state.x_dot[i]);
+  for (int i = 0; i < 6; ++i) {
+    const Tracking& t = tracking[i];
+    if (!(t.high - t.low > kMoved)) continue;
+    const std::string name(coordinate(i).name), unit(coordinate(i).unit);
+    out[fmt::format("{}_peak_to_peak_{}", name, unit)] = t.high - t.low;
+    out[fmt::format("{}_error_max_{}", name, unit)] = std::max(t.rising, t.falling);
+    if (i == 2) {  // all legs extend, or retract, together
+      out["z_error_max_extending_m"] = t.rising;
+      out["z_error_max_retracting_m"] = t.falling;
+    }
+    out[fmt::format("{}_error_rms_{}", name, unit)] = t.rms();
+    if (t.sum_v2 > 0.0) out[name + "_lag_s"] = t.lag();
+  }
+}
+
+/// What gravity compensation leaves, once a calibration has been made.
+void addWrench(const Series& series, nlohmann::ordered_json& out) {
+  struct Largest {
+    double force = 0.0, moment = 0.0;
+    bool any = false;
+    void add(const double (&w)[6]) {
+      force = std::max(force, std::hypot(w[0], w[1], w[2]));
+      moment = std::max(moment, std::hypot(w[3], w[4], w[5]));
+      any = true;
+    }
+  } still, moving;
+  bool calibrated = false;
+  double still_since = HUGE_VAL;
+  for (const Row& row : series.rows) {
+    const double rate = *std::max_element(row.state.x_dot, row.state.x_dot + 6) -
+                        *std::min_element(row.state.x_dot, row.state.x_dot + 6);
+    if (rate != 0.0 || still_since == HUGE_VAL) still_since = row.t;
+    if (!running(row)) continue;
+    if (kindOf(row) == SegmentKind::kCalibration) {
+      calibrated = true;
+      continue;
+    }
+    if (!calibrated) continue;
+    (row.t - still_since > kStill ? still : moving).add(row.state.dynamic);
+  }
+  const auto write = [&](const char* name, const Largest& l) {
+    if (!l.any) return;
+    out[fmt::format("dynamic_force_max_{}_n", name)] = l.force;
+    out[fmt::format("dynamic_moment_max_{}_nm", name)] = l.moment;
+  };
+  write("still", still);
+  write("moving", moving);
+}
+
+/// 4.1.2: how far the sensor drifts, with what, and how much of it a calibration leaves after
+/// hours.
+void addDrift(const Series& series, nlohmann::ordered_json& out) {
+  const std::vector<DriftSample> all = driftSamples(series);
+  if (all.size() < 3) return;
+  out["drift_samples"] = all.size();
+  const auto correlation = [&](int i) {
+    double mean_w = 0.0, mean_t = 0.0, ww = 0.0, tt = 0.0, wt = 0.0;
+    for (const DriftSample& l : all) {
+      mean_w += l.wrench(i) / static_cast<double>(all.size());
+      mean_t += l.temperature / static_cast<double>(all.size());
+    }
+    for (const DriftSample& l : all) {
+      const double w = l.wrench(i) - mean_w, t = l.temperature - mean_t;
+      ww += w * w;
+      tt += t * t;
+      wt += w * t;
+    }
+    return wt / std::sqrt(ww * tt);
+  };
+  const auto residual = [&](int i, double hours) {
+    double most = 0.0;
+    for (const DriftSample& a : all)
+      for (const DriftSample& b : all)
+        if (std::abs(b.t - a.t - 3600.0 * hours) < 60.0)
+          most = std::max(most, std::abs(b.wrench(i) - a.wrench(i)));
+    return most;
+  };
+  for (int i = 0; i < 6; ++i) {
+    const auto [low, high] = std::minmax_element(
+        all.begin(), all.end(),
+        [i](const DriftSample& a, const DriftSample& b) { return a.wrench(i) < b.wrench(i); });
+    const std::string name = std::string(wrenchComponent(i).name) + "_drift_";
+    const std::string unit(wrenchComponent(i).unit);
+    out[name + "peak_to_peak_" + unit] = high->wrench(i) - low->wrench(i);
+    out[name + "after_3h_max_" + unit] = residual(i, 3.0);
+    out[name + "after_4h_max_" + unit] = residual(i, 4.0);
+    out[name + "temperature_correlation"] = correlation(i);
+  }
+}
+
+/// How far the platform was from the robot on its base in free space.
+void addEmulation(const Series& series, nlohmann::ordered_json& out) {
+  const std::optional<Emulation> e = emulation(series);
+  if (!e) return;
+  const Distance error = distance(e->platform, e->base), moved = travel(e->base);
+  out["emulation_travel_m"] = moved.peak_position;
+  out["emulation_error_rms_m"] = error.rms_position;
+  out["emulation_error_max_m"] = error.peak_position;
+  out["emulation_travel_rad"] = moved.peak_attitude;
+  out["emulation_error_rms_rad"] = error.rms_attitude;
+  out["emulation_error_max_rad"] = error.peak_attitude;
+}
+
+/// Of a real-time run: the medians and tails of its times, their histograms, and the missed ticks.
+void addTiming(const Series& series, nlohmann::ordered_json& out) {
+  const timing_t* last = nullptr;
+  for (const Row& row : series.rows)
+    if (row.has_timing) last = &row.timing;
+  if (!last) return;
+  const auto write = [&](const std::string& name, std::int64_t timing_t::*value) {
+    std::vector<double> all;
+    for (const Row& row : series.rows)
+      if (row.has_timing)
+        all.push_back(static_cast<double>(row.timing.*value) * kSecondPerNanosecond);
+    const Latency latency = latencyOf(all);
+    out[name + "_median_s"] = latency.median;
+    out[name + "_p99_s"] = latency.p99;
+    out[name + "_max_s"] = latency.max;
+  };
+  write("wake_up_late", &timing_t::late_ns);
+  write("tick_compute", &timing_t::compute_ns);
+  write("stage_receive", &timing_t::receive_ns);
+  write("stage_tick", &timing_t::tick_ns);
+  write("stage_send", &timing_t::send_ns);
+  write("stage_tell", &timing_t::tell_ns);
+  write("sample_age", &timing_t::sample_age_ns);
+  write("sample_to_command", &timing_t::sample_to_command_ns);
+  // Counts below 1, 2, 4, .. us, the last bin everything beyond.
+  out["wake_up_late_histogram"] = last->late;
+  out["tick_compute_histogram"] = last->compute;
+  out["sample_age_histogram"] = last->sample_age;
+  out["sample_to_command_histogram"] = last->sample_to_command;
+  out["ticks_missed"] = last->missed;
+  out["ticks_missed_woke_late"] = last->missed_woke_late;
+  out["ticks_missed_ran_long"] = last->missed_ran_long;
+}
+
+}  // namespace
+
+nlohmann::ordered_json summarise(const Series& series, const RunResult& result) {
+  nlohmann::ordered_json out;
+  out["scenario"] = series.experiment.name;
+  out["description"] = series.experiment.description;
+  out["configuration_hash"] = series.experiment.hash;
+  out["seed"] = series.experiment.plant.seed;
+  out["version"] = series.version;
+  out["substitute_values"] = series.experiment.substitutes;
+  out["ended"] = name(result.phase);
+  out["trips"] = nlohmann::ordered_json::array();
+  if (!series.rows.empty()) {
+    const Tripped latched(static_cast<std::uint32_t>(series.rows.back().state.latched));
+    latched.forEach([&](Check check) { out["trips"].push_back(name(check)); });
+  }
+  out["first_cause"] = name(result.cause);
+  out["first_cause_tick"] = result.cause_tick;
+  out["ticks"] = result.ticks;
+  out["simulated_s"] = result.simulated;
+  out["wall_s"] = result.wall;
+  out["messages_lost"] = result.lost;
+  out["real_time_factor"] = result.wall > 0.0 ? result.simulated / result.wall : 0.0;
+  addTracking(series, out);
+  addEmulation(series, out);
+  addWrench(series, out);
+  addDrift(series, out);
+  addTiming(series, out);
+  return out;
+}
+
+std::string table(const nlohmann::ordered_json& s) {
+  const auto number = [&](const std::string& key) {
+    return s.contains(key) ? s[key].get<double>() : NAN;
+  };
+  std::string out = fmt::format("{}\n\n", s["description"].get<std::string>());
+  out += fmt::format(
+      "  ended {} after {:.2f} s ({} ticks), {:.4g} x real time, {} substitute values\n",
+      s["ended"].get<std::string>(), number("simulated_s"), s["ticks"].get<std::int64_t>(),
+      number("real_time_factor"), s["substitute_values"].get<int>());
+  if (s["messages_lost"].get<std::int64_t>() > 0)
+    out += fmt::format(
+        "  {} messages or log events were lost (machine too busy, disk full?): the log has holes\n",
+        s["messages_lost"].get<std::int64_t>());
+  if (s["ended"] == name(Phase::kDisarmed))
+    out +=
+        fmt::format("  never armed: {}\n", s["first_cause"] == name(Check::kCount)
+                                               ? std::string("no stream of new samples long enough")
+                                               : s["first_cause"].get<std::string>());
+  if (!s["trips"].empty())
+    out += fmt::format("  stopped in tick {} by: {}\n", s["first_cause_tick"].get<std::int64_t>(),
+                       s["first_cause"].get<std::string>());
+  bool head = false;
+  for (int i = 0; i < 6; ++i) {
+    const std::string c(coordinate(i).name), unit(coordinate(i).unit);
+    if (!s.contains(c + "_error_rms_" + unit)) continue;
+    if (!std::exchange(head, true))
+      out += fmt::format("\n  {:<8}{:>16}{:>16}{:>16}{:>10}\n", "", "moved", "error, peak",
+                         "error, rms", "lag");
+    const double scale = coordinate(i).shown;
+    const std::string_view shown = coordinate(i).shown_unit;
+    const auto cell = [&](const std::string& what) {
+      return fmt::format("{:.3f} {:<3}", number(c + what + unit) * scale, shown);
+    };
+    // A coordinate that is only held somewhere else has no rate to lag behind.
+    const double lag = number(c + "_lag_s");
+    out += fmt::format("  {:<8}{:>16}{:>16}{:>16}{:>10}\n", c, cell("_peak_to_peak_"),
+                       cell("_error_max_"), cell("_error_rms_"),
+                       std::isnan(lag) ? "-" : fmt::format("{:.1f} ms", lag * 1e3));
+  }
+  if (s.contains("z_error_max_extending_m"))
+    out += fmt::format("  z error  {:.1f} mm extending, {:.1f} mm retracting\n",
+                       number("z_error_max_extending_m") * 1e3,
+                       number("z_error_max_retracting_m") * 1e3);
+  if (s.contains("emulation_error_rms_m"))
+    out += fmt::format(
+        "  beside the robot on its base in free space, which moves {:.3f} mm and {:.4f} deg:\n"
+        "           off by {:.3f} mm and {:.4f} deg rms, {:.3f} mm and {:.4f} deg at most\n",
+        number("emulation_travel_m") * 1e3, number("emulation_travel_rad") / kDegree,
+        number("emulation_error_rms_m") * 1e3, number("emulation_error_rms_rad") / kDegree,
+        number("emulation_error_max_m") * 1e3, number("emulation_error_max_rad") / kDegree);
+  for (const char* when : {"still", "moving"}) {
+    const std::string force = fmt::format("dynamic_force_max_{}_n", when);
+    if (s.contains(force))
+      out +=
+          fmt::format("  wrench without gravity, platform {:<7} at most {:8.3f} N, {:8.3f} N m\n",
+                      when, number(force), number(fmt::format("dynamic_moment_max_{}_nm", when)));
+  }
+  if (s.contains("drift_samples")) {
+    out += fmt::format("\n  {:<8}{:>16}{:>16}{:>16}{:>24}\n", "drift", "peak to peak", "after 3 h",
+                       "after 4 h", "temperature correlation");
+    for (int i = 0; i < 6; ++i) {
+      const std::string w(wrenchComponent(i).name), unit(wrenchComponent(i).unit);
+      const auto cell = [&](const char* what) {
+        return fmt::format("{:.3f} {:<3}", number(w + what + unit), wrenchComponent(i).shown_unit);
+      };
+      out += fmt::format("  {:<8}{:>16}{:>16}{:>16}{:>24.3f}\n", w, cell("_drift_peak_to_peak_"),
+                         cell("_drift_after_3h_max_"), cell("_drift_after_4h_max_"),
+                         number(w + "_drift_temperature_correlation"));
+    }
+  }
+  if (s.contains("wake_up_late_median_s")) {
+    out += fmt::format(
+        "  timing   woke {:.0f} us late (p99 {:.0f}, max {:.0f}), computed {:.0f} us (p99 {:.0f}), "
+        "sample {:.1f} ms old\n",
+        number("wake_up_late_median_s") * 1e6, number("wake_up_late_p99_s") * 1e6,
+        number("wake_up_late_max_s") * 1e6, number("tick_compute_median_s") * 1e6,
+        number("tick_compute_p99_s") * 1e6, number("sample_age_median_s") * 1e3);
+    const auto missed = s["ticks_missed"].get<std::int64_t>();
+    out += missed == 0 ? "           no tick missed\n"
+                       : fmt::format(
+                             "           {} ticks missed: {} woken late for, {} after one "
+                             "that ran long\n",
+                             missed, s["ticks_missed_woke_late"].get<std::int64_t>(),
+                             s["ticks_missed_ran_long"].get<std::int64_t>());
+  }
+  return out;
+}
+
+void writeSummary(const nlohmann::ordered_json& summary, const std::string& file) {
+  std::ofstream out(file);
+  out << summary.dump(2) << "\n";
+  out.flush();
+  if (!out) throw InputError(file + ": cannot be written");
+}
+
+}  // namespace ves

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/validation/page.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+namespace ves {
+namespace {
+
+constexpr const char* kStyle = R"(
+:root { color-scheme: light dark; --ink: #1b1f24; --soft: #57606a; --line: #d0d7de; --back: #ffffff;
+  --c0: #0067a8; --c1: #c14e00; --c2: #00805e; --agrees: #1a7f37; --differs: #b42318; --open: #6e5a00; }
+@media (prefers-color-scheme: dark) { :root { --ink: #e6edf3; --soft: #9aa4ae; --line: #3a424b;
+  --back: #12161b; --c0: #58b4f0; --c1: #ff9a52; --c2: #41c99b; --agrees: #56d364; --differs: #ff7b72;
+  --open: #e3c64c; } }
+body { background: var(--back); color: var(--ink); font: 16px/1.5 system-ui, sans-serif;
+  max-width: 62rem; margin: 2rem auto; padding: 0 1rem; }
+h1 { font-size: 1.7rem; line-height: 1.2; } h2 { font-size: 1.25rem; margin-top: 2.5rem;
+  border-bottom: 1px solid var(--line); padding-bottom: .2rem; }
+a { color: var(--c0); } p { max-width: 48rem; }
+.scroll { overflow-x: auto; }
+table { border-collapse: collapse; font-size: .85rem; margin: .8rem 0; font-variant-numeric: tabular-nums; }
+th, td { text-align: left; vertical-align: top; padding: .3rem .6rem .3rem 0;
+  border-bottom: 1px solid var(--line); } th { font-weight: 600; color: var(--soft); }
+table.numbers { font-size: .78rem; } table.numbers td { white-space: nowrap; }
+table.numbers td:not(:first-child), table.numbers th:not(:first-child) { text-align: right; padding: .3rem 0 .3rem .7rem; }
+figure { margin: 1rem 0; } figure svg { width: 100%; height: auto; display: block; }
+figcaption { font-size: .85rem; color: var(--soft); }
+.claim { border-left: 3px solid var(--line); padding: .1rem 0 .1rem .9rem; margin: .8rem 0; font-size: .92rem; }
+.claim p { margin: .25rem 0; } .claim .says { color: var(--soft); }
+.verdict { font-weight: 600; white-space: nowrap; } .agrees { color: var(--agrees); }
+.differs { color: var(--differs); } .open { color: var(--open); }
+svg .ink { stroke: var(--ink); } svg .ink-text { fill: var(--ink); } svg .gridline { stroke: var(--line); }
+svg .c0 { stroke: var(--c0); } svg .c1 { stroke: var(--c1); } svg .c2 { stroke: var(--c2); }
+@media print { :root { --ink: #000; --back: #fff; --line: #bbb; --c0: #0067a8; --c1: #c14e00; --c2: #00805e; }
+  body { margin: 0; max-width: none; font-size: 10pt; } figure, .claim, tr { break-inside: avoid; }
+  h2 { break-after: avoid; } }
+)";
+
+std::string escaped(const std::string& text) {
+  std::string out;
+  for (const char c : text) switch (c) {
+      case '&': out += "&amp;"; break;
+      case '<': out += "&lt;"; break;
+      case '>': out += "&gt;"; break;
+      case '"': out += "&quot;"; break;
+      default: out += c;
+    }
+  return out;
+}
+
+std::string badge(Verdict verdict) {
+  const char* look = verdict == Verdict::kAgrees    ? "agrees"
+                     : verdict == Verdict::kDiffers ? "differs"
+                                                    : "open";
+  return fmt::format("<span class=\"verdict {}\">{}</span>", look, name(verdict));
+}
+
+}  // namespace
+
+void Page::section(const std::string& title) {
+  body_ += fmt::format("<h2 id=\"s{}\">{}</h2>\n", ++sections_, escaped(title));
+}
+
+void Page::text(const std::string& paragraph) {
+  body_ += fmt::format("<p>{}</p>\n", escaped(paragraph));
+}
+
+void Page::claim(const Claim& claim) {
+  claims_.push_back(claim);
+  section_of_claim_.push_back(sections_);
+  body_ +=
+      fmt::format("<div class=\"claim\"><p class=\"says\">{}: {}</p><p>{}</p><p>{}{}</p></div>\n",
+                  escaped(claim.where), escaped(claim.says), escaped(claim.reached),
+                  badge(claim.verdict), claim.why.empty() ? "" : ": " + escaped(claim.why));
+}
+
+void Page::figure(const std::string& caption, const std::vector<Panel>& panels) {
+  body_ += fmt::format("<figure>\n{}<figcaption>{}</figcaption></figure>\n", svg(panels),
+                       escaped(caption));
+}
+
+void Page::table(const std::vector<std::string>& header,
+                 const std::vector<std::vector<std::string>>& rows) {
+  body_ += "<div class=\"scroll\"><table class=\"numbers\"><thead><tr>";
+  for (const std::string& cell : header) body_ += "<th>" + escaped(cell) + "</th>";
+  body_ += "</tr></thead><tbody>\n";
+  for (const auto& row : rows) {
+    body_ += "<tr>";
+    for (const std::string& cell : row) body_ += "<td>" + escaped(cell) + "</td>";
+    body_ += "</tr>\n";
+  }
+  body_ += "</tbody></table></div>\n";
+}
+
+std::string Page::html(const std::string& title, const std::string& lead) const {
+  std::string counts;
+  for (const Verdict v : {Verdict::kAgrees, Verdict::kDiffers, Verdict::kCannotTell}) {
+    const auto n = std::count_if(claims_.begin(), claims_.end(),
+                                 [v](const Claim& c) { return c.verdict == v; });
+    if (n) counts += fmt::format("{}{} {}", counts.empty() ? "" : ", ", n, badge(v));
+  }
+  std::string rows;
+  for (std::size_t i = 0; i < claims_.size(); ++i) {
+    const Claim& c = claims_[i];
+    rows +=
+        fmt::format("<tr><td><a href=\"#s{}\">{}</a></td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
+                    section_of_claim_[i], escaped(c.where), escaped(c.says), escaped(c.reached),
+                    badge(c.verdict));
+  }
+  return fmt::format(
+      "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
+      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+      "<title>{0}</title>\n<style>{1}</style></head>\n<body>\n<h1>{0}</h1>\n<p>{2}</p>\n"
+      "<p>{3} claims: {4}.</p>\n<div "
+      "class=\"scroll\"><table><thead><tr><th>report</th><th>claim</th>"
+      "<th>reached</th><th>verdict</th></tr></thead><tbody>\n{5}</tbody></table></div>\n{6}"
+      "</body></html>\n",
+      escaped(title), kStyle, escaped(lead), claims_.size(), counts, rows, body_);
+}
+
+}  // namespace ves
