@@ -186,6 +186,8 @@ INSTANTIATE_TEST_SUITE_P(
             "base={arm: {damping_ratio: 0, stiffness_scale: 1, pose_deg: {}, chain: [{beam: {to_m: "
             "[1, 0, 0], EI_n_m2: 1, GJ_n_m2: 1, EA_n: 1, mass_kg: 0, radius_m: 0, elements: 1}}]}}",
             "base.arm.chain: a part that can move has no mass"},
+        Bad{"two_signs", "z_sine", "gravity_m_per_s2=+-1",
+            "gravity_m_per_s2: '+-1', want a number in [0, 100]"},
         Bad{"nan", "z_sine", "legs.tau_s=nan", "legs.tau_s: 'nan', want a number in [1e-06, 1]"},
         Bad{"infinite", "z_sine", "platform.home_height_m=inf", "platform.home_height_m: 'inf'"},
         Bad{"with_unit", "z_sine", "legs.tau_s=6.4 ms", "legs.tau_s: '6.4 ms', want a number"},

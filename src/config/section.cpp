@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+#include "ves/config/document.hpp"
+
+namespace ves {
+namespace {
+
+std::string_view kindName(const Value& value) {
+  switch (value.kind) {
+    case Value::Kind::kNull: return "nothing";
+    case Value::Kind::kScalar: return "a single value";
+    case Value::Kind::kList: return "a list";
+    case Value::Kind::kMap: return "a map";
+  }
+  return "";
+}
+
+std::string interval(double lo, double hi) {
+  if (lo == -HUGE_VAL && hi == HUGE_VAL) return "a finite number";
+  if (hi == HUGE_VAL) return fmt::format("a number of at least {}", lo);
+  return fmt::format("a number in [{}, {}]", lo, hi);
+}
+
+/// Edit distance, for "did you mean".
+std::size_t distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t above = row[j];
+      row[j] = std::min({above + 1, row[j - 1] + 1, diagonal + (a[i - 1] != b[j - 1])});
+      diagonal = above;
+    }
+  }
+  return row.back();
+}
+
+}  // namespace
+
+Section::Section(const Value& value, std::string path) : value_(&value), path_(std::move(path)) {
+  if (value.kind != Value::Kind::kMap)
+    failAt(value, path_, fmt::format("is {}, want a map of keys", kindName(value)));
+}
+
+bool Section::has(std::string_view key) {
+  used_.emplace(key);
+  return value_->find(key) != nullptr;
+}
+
+const Value& Section::need(std::string_view key) {
+  used_.emplace(key);
+  const Value* value = value_->find(key);
+  if (!value) fail(key, "missing");
+  return *value;
+}
+
+double Section::toNumber(const Value& value, const std::string& path, double lo, double hi) const {
+  double x = 0.0;
+  const char* begin = value.text.data();
+  const char* end = begin + value.text.size();
+  if (end - begin > 1 && begin[0] == '+' && begin[1] != '-') ++begin;
+  const auto [last, error] = std::from_chars(begin, end, x);
+  if (value.kind != Value::Kind::kScalar)
+    failAt(value, path, fmt::format("is {}, want {}", kindName(value), interval(lo, hi)));
+  if (error != std::errc() || last != end || !(x >= lo && x <= hi) || !std::isfinite(x))
+    failAt(value, path, fmt::format("'{}', want {}", value.text, interval(lo, hi)));
+  return x;
+}
+
+double Section::number(std::string_view key, double lo, double hi) {
+  return toNumber(need(key), fmt::format("{}{}", path_.empty() ? "" : path_ + ".", key), lo, hi);
+}
+
+std::int64_t Section::integer(std::string_view key, std::int64_t lo, std::int64_t hi) {
+  const Value& value = need(key);
+  std::int64_t x = 0;
+  const char* end = value.text.data() + value.text.size();
+  const auto [last, error] = std::from_chars(value.text.data(), end, x);
+  if (value.kind != Value::Kind::kScalar || error != std::errc() || last != end || x < lo || x > hi)
+    fail(key, fmt::format("'{}', want a whole number in [{}, {}]", value.text, lo, hi));
+  return x;
+}
+
+bool Section::flag(std::string_view key) { return choice(key, {"true", "false"}) == "true"; }
+
+std::string Section::text(std::string_view key) {
+  const Value& value = need(key);
+  if (value.kind != Value::Kind::kScalar)
+    fail(key, fmt::format("is {}, want text", kindName(value)));
+  return value.text;
+}
+
+std::vector<std::string> Section::texts(std::string_view key) {
+  const Value& value = need(key);
+  if (value.kind != Value::Kind::kList)
+    fail(key, fmt::format("is {}, want a list", kindName(value)));
+  std::vector<std::string> out;
+  for (const Value& child : value.children) {
+    if (child.kind != Value::Kind::kScalar)
+      failAt(child, fmt::format("{}{}", path_.empty() ? "" : path_ + ".", key),
+             fmt::format("holds {}, want texts", kindName(child)));
+    out.push_back(child.text);
+  }
+  return out;
+}
+
+std::string Section::choice(std::string_view key, std::initializer_list<std::string_view> allowed) {
+  const Value& value = need(key);
+  if (value.kind != Value::Kind::kScalar ||
+      std::find(allowed.begin(), allowed.end(), value.text) == allowed.end())
+    fail(key, fmt::format("'{}', want one of {}", value.text, fmt::join(allowed, ", ")));
+  return value.text;
+}
+
+Eigen::VectorXd Section::vector(std::string_view key, int size, double lo, double hi) {
+  const Value& value = need(key);
+  const auto n = static_cast<int>(value.children.size());
+  const std::string want = size < 0 ? "at least one" : std::to_string(size);
+  if (value.kind != Value::Kind::kList || n == 0 || (size >= 0 && n != size))
+    fail(key, value.kind == Value::Kind::kList
+                  ? fmt::format("has {} entries, want {} numbers", n, want)
+                  : fmt::format("is {}, want a list of {} numbers", kindName(value), want));
+  Eigen::VectorXd out(n);
+  for (int i = 0; i < n; ++i)
+    out(i) = toNumber(value.children[static_cast<std::size_t>(i)],
+                      fmt::format("{}{}[{}]", path_.empty() ? "" : path_ + ".", key, i), lo, hi);
+  return out;
+}
+
+Eigen::MatrixXd Section::matrix(std::string_view key, int rows, int cols, double lo, double hi) {
+  const Value& value = need(key);
+  if (rows < 0 && value.kind == Value::Kind::kList && !value.children.empty())
+    rows = static_cast<int>(value.children.size());
+  if (value.kind != Value::Kind::kList || static_cast<int>(value.children.size()) != rows)
+    fail(key,
+         fmt::format("want {} rows of {} numbers", rows < 0 ? "one or more" : std::to_string(rows),
+                     cols < 0 ? "equally many" : std::to_string(cols)));
+  if (cols < 0) cols = static_cast<int>(value.children[0].children.size());
+  if (cols == 0) fail(key, "the first row is empty");
+  Eigen::MatrixXd out(rows, cols);
+  for (int i = 0; i < rows; ++i) {
+    const Value& row = value.children[static_cast<std::size_t>(i)];
+    const std::string path = fmt::format("{}{}[{}]", path_.empty() ? "" : path_ + ".", key, i);
+    if (row.kind != Value::Kind::kList || static_cast<int>(row.children.size()) != cols)
+      failAt(row, path, fmt::format("has {} entries, want {}", row.children.size(), cols));
+    for (int j = 0; j < cols; ++j)
+      out(i, j) = toNumber(row.children[static_cast<std::size_t>(j)],
+                           fmt::format("{}[{}]", path, j), lo, hi);
+  }
+  return out;
+}
+
+Section Section::section(std::string_view key) {
+  return {need(key), fmt::format("{}{}", path_.empty() ? "" : path_ + ".", key)};
+}
+
+std::vector<Section> Section::list(std::string_view key) {
+  const Value& value = need(key);
+  if (value.kind != Value::Kind::kList)
+    fail(key, fmt::format("is {}, want a list", kindName(value)));
+  std::vector<Section> out;
+  for (std::size_t i = 0; i < value.children.size(); ++i)
+    out.emplace_back(value.children[i],
+                     fmt::format("{}{}[{}]", path_.empty() ? "" : path_ + ".", key, i));
+  return out;
+}
+
+std::string Section::onlyKey(std::initializer_list<std::string_view> allowed,
+                             std::initializer_list<std::string_view> besides) {
+  std::string found;
+  for (const std::string& key : value_->keys) {
+    if (std::find(besides.begin(), besides.end(), key) != besides.end()) continue;
+    if (std::find(allowed.begin(), allowed.end(), key) == allowed.end())
+      fail(key, fmt::format("unknown, want one of {}", fmt::join(allowed, ", ")));
+    if (!found.empty()) fail(key, fmt::format("beside {}, want only one of them", found));
+    found = key;
+  }
+  if (found.empty())
+    failAt(*value_, path_, fmt::format("want one of {}", fmt::join(allowed, ", ")));
+  return found;
+}
+
+void Section::finish() const {
+  for (const std::string& key : value_->keys) {
+    if (used_.count(key)) continue;
+    std::string hint;
+    std::size_t best = 1 + key.size() / 3;
+    for (const std::string& known : used_) {
+      if (value_->find(known) || distance(key, known) > best) continue;
+      best = distance(key, known);
+      hint = fmt::format(", did you mean {}?", known);
+    }
+    if (hint.empty()) hint = fmt::format(", known here: {}", fmt::join(used_, ", "));
+    fail(key, "unknown key" + hint);
+  }
+}
+
+void Section::fail(std::string_view key, const std::string& what) const {
+  const Value* value = value_->find(key);
+  failAt(value ? *value : *value_, fmt::format("{}{}", path_.empty() ? "" : path_ + ".", key),
+         what);
+}
+
+void Section::failAt(const Value& at, const std::string& path, const std::string& what) const {
+  throw InputError(fmt::format("{}:{}: {}{}{}", at.file ? *at.file : "?", at.line, path,
+                               path.empty() ? "" : ": ", what));
+}
+
+}  // namespace ves

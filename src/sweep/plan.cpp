@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <charconv>
+#include <cmath>
+
+#include "ves/sweep/sweep.hpp"
+
+namespace ves {
+namespace {
+
+/// splitmix64: a stream of its own for every run and key.
+double uniform(std::uint64_t seed, std::uint64_t run, std::uint64_t key) {
+  std::uint64_t z = seed * 0x9e3779b97f4a7c15u + run * 0xbf58476d1ce4e5b9u + key;
+  for (int i = 0; i < 2; ++i) {
+    z += 0x9e3779b97f4a7c15u;
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    z ^= z >> 31;
+  }
+  return static_cast<double>(z >> 11) * 0x1p-53;
+}
+
+bool toNumber(const std::string& text, double& x) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), x);
+  return error == std::errc() && end == text.data() + text.size() && std::isfinite(x);
+}
+
+std::vector<std::string> split(const std::string& text, char at) {
+  std::vector<std::string> out(1);
+  int depth = 0;  // a list is one value
+  for (const char c : text) {
+    depth += (c == '[' || c == '{') - (c == ']' || c == '}');
+    if (c == at && depth == 0)
+      out.emplace_back();
+    else
+      out.back() += c;
+  }
+  return out;
+}
+
+}  // namespace
+
+void SweepPlan::take(const std::string& key, const std::string& option) const {
+  for (const std::string& other : keys())
+    if (other == key) throw InputError(fmt::format("{}: '{}' is given twice", option, key));
+}
+
+void SweepPlan::vary(const std::string& option) {
+  const std::size_t equals = option.find('=');
+  Varied v;
+  if (equals != std::string::npos && equals > 0) {
+    v.key = option.substr(0, equals);
+    const std::string text = option.substr(equals + 1);
+    const std::vector<std::string> range = split(text, ':');
+    double from = 0.0, to = 0.0, count = 0.0;
+    constexpr double kMost = 1e6;
+    if (range.size() == 3 && toNumber(range[0], from) && toNumber(range[1], to) &&
+        toNumber(range[2], count) && count >= 2 && count <= kMost && count == std::floor(count)) {
+      for (double i = 0.0; i < count; i += 1.0)
+        v.values.push_back(fmt::format("{}", from + (to - from) * i / (count - 1.0)));
+    } else if (range.size() == 1 || text.find('{') != std::string::npos) {
+      v.values = split(text, ',');
+      for (const std::string& value : v.values)
+        if (value.empty()) v.values.clear();
+    }
+  }
+  if (v.values.empty())
+    throw InputError(fmt::format(
+        "--vary '{}': want KEY=V1,V2,.. or KEY=FROM:TO:COUNT with a COUNT of 2 or more", option));
+  take(v.key, "--vary");
+  varied_.push_back(v);
+}
+
+void SweepPlan::draw(const std::string& option) {
+  const std::size_t equals = option.find('='), colon = option.find(':');
+  Drawn d;
+  if (equals == std::string::npos || equals == 0 || colon == std::string::npos || colon < equals ||
+      !toNumber(option.substr(equals + 1, colon - equals - 1), d.from) ||
+      !toNumber(option.substr(colon + 1), d.to) || !(d.from <= d.to))
+    throw InputError(fmt::format("--draw '{}': want KEY=FROM:TO, FROM not above TO", option));
+  d.key = option.substr(0, equals);
+  take(d.key, "--draw");
+  drawn_.push_back(d);
+}
+
+std::int64_t SweepPlan::size() const {
+  constexpr double kMost = 1e9;
+  double product = static_cast<double>(draws_);
+  for (const Varied& v : varied_) product *= static_cast<double>(v.values.size());
+  if (product > kMost)
+    throw InputError(fmt::format("--vary: {:g} runs, want at most {:g}", product, kMost));
+  return static_cast<std::int64_t>(product);
+}
+
+std::vector<std::string> SweepPlan::keys() const {
+  std::vector<std::string> out;
+  for (const Varied& v : varied_) out.push_back(v.key);
+  for (const Drawn& d : drawn_) out.push_back(d.key);
+  if (draws_ > 1 && std::find(out.begin(), out.end(), "seed") == out.end()) out.push_back("seed");
+  return out;
+}
+
+std::string SweepPlan::text() const {
+  std::string out =
+      fmt::format("{} runs, {} of each combination, seed {}\n", size(), draws_, seed_);
+  for (const Varied& v : varied_)
+    out += fmt::format("vary {}={}\n", v.key, fmt::join(v.values, ","));
+  for (const Drawn& d : drawn_) out += fmt::format("draw {}={}:{}\n", d.key, d.from, d.to);
+  return out;
+}
+
+std::vector<std::string> SweepPlan::overrides(std::int64_t run) const {
+  std::vector<std::string> out;
+  std::int64_t left = run / draws_;
+  for (const Varied& v : varied_) {
+    const auto n = static_cast<std::int64_t>(v.values.size());
+    out.push_back(v.key + "=" + v.values[static_cast<std::size_t>(left % n)]);
+    left /= n;
+  }
+  const auto number = static_cast<std::uint64_t>(run);
+  for (std::size_t i = 0; i < drawn_.size(); ++i) {
+    const Drawn& d = drawn_[i];
+    out.push_back(
+        fmt::format("{}={}", d.key, d.from + (d.to - d.from) * uniform(seed_, number, i + 1)));
+  }
+  if (keys().size() > out.size())
+    out.push_back(fmt::format(
+        "seed={}", static_cast<std::int64_t>(std::floor(uniform(seed_, number, 0) * INT32_MAX))));
+  return out;
+}
+
+}  // namespace ves
