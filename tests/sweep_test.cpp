@@ -175,7 +175,7 @@ TEST_F(Sweep, SaysInTheRowWhatCouldNotRun) {
                   out("t"))
                 .status,
             0);
-  EXPECT_EQ(rows(folder_ / "t/sweep.csv").at(0).at("ended"), "cut short");
+  EXPECT_EQ(rows(folder_ / "t/sweep.csv").at(0).at("ended"), "aborted");
 }
 
 TEST_F(Sweep, RefusesByName) {

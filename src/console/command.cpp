@@ -157,7 +157,7 @@ const std::vector<Item>& menu() {
        "a ramp or a sine in each coordinate"},
       {Verb::kMove, "move", "[in SECONDS] [COORDINATE TO]...", "gently to a pose; alone: home"},
       {Verb::kCalibration, "calibration", "", "the sensor's bias, from 100 samples at rest"},
-      {Verb::kTare, "tare", "", "what the sensor feels now counts as nothing"},
+      {Verb::kTare, "tare", "", "subtract the wrench that is measured now"},
       {Verb::kRobot, "robot", "JOINT TO SECONDS", "move a joint of the simulated robot"},
       {Verb::kCollect, "collect", "FILE [SECONDS [HZ [NAME...]]]", "variables to a CSV file"},
       {Verb::kStatus, "status", "", "where everything is"},

@@ -53,8 +53,8 @@ std::string_view name(Refusal refusal) noexcept {
     case Refusal::kOutside: return "its path fails a safety check";
     case Refusal::kUnstable: return "with this base and robot the loop would diverge";
     case Refusal::kNoCompensation: return "the configuration has no compensation";
-    case Refusal::kUnassessed: return "nobody has checked whether this loop is stable";
-    case Refusal::kLoaded: return "the sensor feels too much: calibrate, or take the load away";
+    case Refusal::kUnassessed: return "the stability of this loop has not been checked";
+    case Refusal::kLoaded: return "the measured wrench is too large: calibrate, or remove the load";
     case Refusal::kCount: break;
   }
   return "unknown";

@@ -11,7 +11,7 @@ double seconds(std::int64_t ns) { return static_cast<double>(ns) * kSecondPerNan
 
 constexpr std::int64_t kMidUpdate = kUpdatePeriod / 2;  // [ns]
 constexpr double kStillSpeed = 1e-9;                    // [m/s]
-constexpr std::int64_t kSettle = 100'000'000;           // [ns] between looks whether all is still
+constexpr std::int64_t kSettle = 100'000'000;           // [ns] between checks whether all is still
 
 }  // namespace
 
@@ -25,7 +25,7 @@ Plant::Plant(const PlantConfig& config)
       sensor_step_(sensor_.prepare(seconds(kUpdatePeriod))),
       position_step_(filter_position_.prepare(seconds(kUpdatePeriod))),
       rate_step_(filter_velocity_.prepare(seconds(kUpdatePeriod))),
-      next_look_(kNever),
+      next_step_(kNever),
       joints_(config.payload.robot.joints, config.initial_joints) {
   X_SL0_ = inverse(config.payload.X_PS) * config.payload.X_PL0();
 
@@ -108,10 +108,10 @@ bool Plant::still() const noexcept {
 void Plant::skip(std::int64_t until) noexcept {
   const std::int64_t time = (until - now_ - 1'000'000'000) / kUpdatePeriod * kUpdatePeriod;
   now_ += time;
-  last_look_ += time;
+  last_step_ += time;
   if (heard_ != kNever) heard_ += time;  // who asks for such a leap would have gone on commanding
   next_reading_ += time;
-  if (next_look_ != kNever) next_look_ += time;
+  if (next_step_ != kNever) next_step_ += time;
 }
 
 void Plant::advance(std::int64_t until) noexcept {
@@ -122,13 +122,13 @@ void Plant::advance(std::int64_t until) noexcept {
 
 void Plant::runEvents(std::int64_t until) noexcept {
   for (;;) {
-    const std::int64_t next = std::min({next_reading_, next_look_, next_robot_event_});
+    const std::int64_t next = std::min({next_reading_, next_step_, next_robot_event_});
     if (next > until) break;
     moveActuators(next);
     if (next == next_robot_event_) startRobotEvents();
-    if (next == next_look_) {
-      look();
-      next_look_ = kNever;
+    if (next == next_step_) {
+      stepMechanics();
+      next_step_ = kNever;
     }
     if (next == next_reading_) {
       readTransducers();
@@ -189,7 +189,7 @@ void Plant::readTransducers() noexcept {
   watch();
   for (std::size_t i = 0; i < kLegs; ++i)
     slaves_[i].read(config_.transducer.count(actuators_[i].length()), reference_[i]);
-  if (slaves_[0].updated()) next_look_ = now_ + kMidUpdate;
+  if (slaves_[0].updated()) next_step_ = now_ + kMidUpdate;
 }
 
 Wrench Plant::sensorLoad() const noexcept {
@@ -206,9 +206,9 @@ LegMotion Plant::legOutputs(double dt) noexcept {
     out.L(i) = actuator.length();
     out.L_dot(i) = actuator.velocity();
   }
-  // The mean since the last look. A valve's step makes the acceleration itself jump; points of it,
+  // The mean since the last step. A valve's step makes the acceleration itself jump; points of it,
   // joined by lines, would put part of every jump before its time, and a sample that is taken
-  // between two looks shifts that part: together they made the wrench 11 ms early.
+  // between two steps shifts that part: together they made the wrench 11 ms early.
   out.L_ddot = (out.L_dot - truth_.legs.L_dot) / dt;
   truth_.legs = out;
   if (config_.filters == LegFilters::kNone) return out;
@@ -223,11 +223,11 @@ LegMotion Plant::legOutputs(double dt) noexcept {
           filter_acceleration_.output().matrix()};
 }
 
-/// Brings platform, robot and sensor from the last look to now.
-void Plant::look() noexcept {
-  if (now_ <= last_look_) return;
-  const double dt = seconds(now_ - last_look_);
-  last_look_ = now_;
+/// Brings platform, robot and sensor from the last step to now.
+void Plant::stepMechanics() noexcept {
+  if (now_ <= last_step_) return;
+  const double dt = seconds(now_ - last_step_);
+  last_step_ = now_;
 
   const LegMotion legs = legOutputs(dt);
   Transform guess = truth_.P.X;
@@ -246,7 +246,7 @@ void Plant::look() noexcept {
 }
 
 Sample Plant::sample() noexcept {
-  look();
+  stepMechanics();
   truth_.time = now_;
   truth_.x = config_.geometry.toHome(truth_.P.X);
   Sample s;

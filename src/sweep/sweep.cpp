@@ -105,7 +105,7 @@ std::string rowOf(const SweepPlan& plan, const SweepOptions& options, std::int64
       result = runLockstep(e, &writer, {});
     }
     const auto summary = summarise(readSeries(log), result);
-    row += fmt::format(",{},{},{}", result.aborted ? "cut short" : name(result.phase),
+    row += fmt::format(",{},{},{}", result.aborted ? "aborted" : name(result.phase),
                        name(result.cause), result.cause_tick);
     for (const char* number : kNumbers)
       row += summary.contains(number) ? fmt::format(",{}", summary[number].get<double>()) : ",";

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+//
+// The emulated base from YAML: matrices, a table of modes, or an arm of beams.
 #pragma once
 
 #include <filesystem>

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
+//
+// One experiment from its scenario file: what the controller is told, what the plant is, and the
+// text both came from.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+//
+// Robots from URDF.
 #pragma once
 
 #include <string>

@@ -31,7 +31,7 @@ struct Braking {
   double rotation = 0.0;     // [rad/s^2]
 };
 
-/// How fast a motion may be for which nobody has said how fast.
+/// The speed of a motion whose duration is not given.
 struct GentleMotion {
   double speed = 0.05;           // [m/s] peak
   double rotation = 0.10;        // [rad/s] peak
@@ -40,10 +40,10 @@ struct GentleMotion {
 
 /// Whether admittance control with this base, robot and machine decays (analysis/gate.hpp).
 enum class Stability : std::int32_t {
-  kUnknown,   // nobody has looked: refused
+  kUnknown,   // not checked: refused
   kStable,    // begins
   kUnstable,  // refused
-  kForced     // somebody wants it, whatever it does
+  kForced     // begins, whatever the check said
 };
 inline constexpr std::string_view kStabilityNames[] = {"unknown", "stable", "unstable", "forced"};
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Safety checks that need a memory: each looks at one thing from tick to tick, and says whether it
-// is still right.
+// Safety checks that need a memory of earlier ticks.
 #pragma once
 
 #include "ves/control/safety_checks.hpp"
@@ -22,15 +21,15 @@ class LegSpeed {
 };
 
 /// Readings of the legs: one that no leg can have reached since the last is not model; the one
-/// before stands. Twice in a row is a fault.
+/// before is kept. Twice in a row is a fault.
 class LegReadings {
  public:
   static constexpr int kPatience = 1;  // [-] readings in a row that may be wrong
 
   /// `speed` is what the legs were told lately, `time` [s] has passed since the last reading.
-  /// Returns the lengths to believe.
+  /// Returns the accepted lengths.
   const Vec6& take(const Vec6& L, const Vec6& speed, double time, double jump) noexcept;
-  /// Believes whatever comes next: the legs were not ours.
+  /// Accepts whatever comes next: the legs did not follow our commands.
   void reset() noexcept { known_ = false; }
 
   bool good() const noexcept { return wrong_ <= kPatience; }

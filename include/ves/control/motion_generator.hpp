@@ -34,10 +34,10 @@ class MotionGenerator {
   void hold() noexcept;
 
   SegmentKind kind() const noexcept { return segment_.kind; }
-  /// The plan is at its end; a watch at `tick` too. A calibration ends by itself.
+  /// The plan is at its end; a monitor segment at `tick` too. A calibration ends by itself.
   bool over(std::int64_t tick) const noexcept;
   bool moving() const noexcept { return !motion_.x_dot.isZero(0.0); }
-  /// Ticks after `tick` in which a watch looks at nothing.
+  /// Ticks after `tick` in which a monitor segment takes no sample.
   std::int64_t idleTicks(std::int64_t tick) const noexcept;
 
   const PathPoint<6>& motion() const noexcept { return motion_; }  // last commanded

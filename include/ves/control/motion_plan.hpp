@@ -33,7 +33,7 @@ class MotionPlan {
   /// Brakes to rest, and stays.
   static MotionPlan brake(const PlanSettings& settings, const PathPoint<6>& from,
                           const Braking& braking) noexcept;
-  /// The segment, begun at `from`. One that plans no motion (calibration, watch, admittance
+  /// The segment, begun at `from`. One that plans no motion (calibration, monitor, admittance
   /// control) has a length only.
   static MotionPlan of(const PlanSettings& settings, const Segment& segment,
                        const PathPoint<6>& from) noexcept;

@@ -16,7 +16,7 @@ enum class SegmentKind : std::int32_t {
   kMove,         // brakes if it must, then gently to rest at a pose
   kTrajectory,
   kAdmittance,  // from wherever the platform is, as the model's state at rest
-  kMonitor,     // hold, for a look at the sensor every interval
+  kMonitor,     // hold, and sample the sensor every interval
   kPath,        // the configuration's recorded path
   kCount
 };
@@ -29,7 +29,7 @@ struct Segment {
   double duration = 0.0;    // [s] of a move: 0 for as long as is gentle
   Pose target;              // of a move, from home
   Trajectory trajectory{};  // of a trajectory
-  double interval = 0.0;    // [s] of a watch, from one look to the next
+  double interval = 0.0;    // [s] of a monitor segment, from one sample to the next
 };
 
 inline constexpr int kMaxSegments = 64;
@@ -42,7 +42,7 @@ struct Program {
 /// One of its segments is admittance control.
 bool wantsAdmittance(const Program& program) noexcept;
 
-/// A calibration takes so many samples, and so does each look of a watch.
+/// A calibration takes so many samples, and so does each sample of a monitor segment.
 inline constexpr int kCalibrationSamples = 100;  // [-] per channel
 
 enum class Request : std::int32_t {
@@ -52,7 +52,7 @@ enum class Request : std::int32_t {
   kArm,           // take the legs and hold; orders will follow
   kRun,           // the order's segment
   kHold,          // brake and hold here
-  kTare,          // what the sensor feels now counts as nothing
+  kTare,          // what is measured now is subtracted from here on
   kReset,         // out of a stop, back to disarmed
   kCompensate,    // what the configuration has of compensation comes in
   kUncompensate,  // and goes out again: as published
@@ -70,10 +70,10 @@ enum class Refusal : std::int32_t {
   kNotStopped,      // nothing to leave
   kCauseRemains,    // a check still fails
   kOutside,         // its path would fail a safety check
-  kLoaded,          // the sensor feels more than admittance control should begin with
+  kLoaded,          // the wrench is larger than admittance control should begin with
   kUnstable,        // admittance control with this base and robot would diverge
   kNoCompensation,  // the configuration has none
-  kUnassessed,      // nobody has looked whether this loop decays
+  kUnassessed,      // the stability of this loop was not checked
   kCount
 };
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // Safety checks (Appendix C). Each is one function that tells whether its requirement holds, and
-// one bit. A value that is not a number never satisfies a requirement.
+// one bit. NaN fails every check.
 #pragma once
 
 #include <array>
@@ -16,7 +16,7 @@ namespace ves {
 enum class Check : std::uint32_t {
   kPanicButton,
   kFloorMat,
-  kFinite,             // a number that is not one, anywhere in the tick
+  kFinite,             // NaN or infinity, anywhere in the tick
   kStale,              // no new sample for too long
   kOverrun,            // ticks missed: one long stall, or too many in a second
   kLegReading,         // a leg's reading jumped as no leg can
@@ -40,7 +40,7 @@ enum class Check : std::uint32_t {
 std::string_view name(Check check) noexcept;
 
 /// What a trip does. A freeze holds the last checked lengths at once. A controlled stop brakes
-/// along the motion first: for causes that say nothing against the next centimetres of the path.
+/// along the motion first: for faults that leave the planned path safe.
 bool freezes(Check check) noexcept;
 
 /// A set of tripped checks.
@@ -102,8 +102,8 @@ struct SafetyLimits {
   double frozen_counts = 0.0;         // [count] by which the weight should have changed one of them
   int growing_windows = 0;            // [-] in a row, each with more energy than the last
   double growth_floor = 0.0;          // [J] below which nothing is said
-  double start_force = 0.0;           // [N] felt when admittance control begins
-  double start_moment = 0.0;          // [N m]
+  double start_force = 0.0;   // [N] measured, gravity compensated, when admittance control begins
+  double start_moment = 0.0;  // [N m]
 };
 
 /// Successive commanded lengths differ by no more than leg_velocity allows in one period.

@@ -17,7 +17,7 @@ inline constexpr int kAdcChannels = 7;  // six of the wrench, then hydraulic pre
 using AdcCounts = std::array<std::int32_t, kAdcChannels>;
 using LegCounts = std::array<std::int32_t, kLegs>;
 
-/// Safety loops that are closed when nobody touches them: a broken wire reads as pressed.
+/// Safety loops, closed while the switches are not pressed: a broken wire reads as pressed.
 enum Switch : std::uint32_t { kPanicButtonClosed = 1u, kFloorMatClosed = 2u };
 inline constexpr std::uint32_t kAllSwitchesClosed = kPanicButtonClosed | kFloorMatClosed;
 

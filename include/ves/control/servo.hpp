@@ -56,8 +56,8 @@ Vec6 feedForward(const ServoModel& servo, const LegMotion& legs, double lead, do
 /// edge, so what the model knows below a count stays.
 class ServoObserver {
  public:
-  /// `phase` [-] of an update is to pass until the first: which one the LegSlaves have nobody
-  /// knows, and they go through all of them.
+  /// `phase` [-] of an update is to pass until the first: the LegSlaves' initial phase is
+  /// unknown, and it drifts through all values.
   ServoObserver(const ServoModel& servo, double period, double phase = 0.5);
 
   /// At rest at L.
@@ -72,8 +72,8 @@ class ServoObserver {
   const Vec6& length() const noexcept { return L_; }    // [m]
   const Vec6& velocity() const noexcept { return v_; }  // [m/s]
   /// [m] what the LegSlaves' readings will be too long, on average over the coming period, the legs
-  /// moving on at L_dot. A servo that is told so much more follows as if it had no counts: without
-  /// it a leg comes to rest at the edge of a count, wherever within it it should be.
+  /// moving on at L_dot. Adding this offset to the reference cancels the quantisation; without it a
+  /// leg comes to rest at the edge of a count, wherever in the count it should be.
   Vec6 rounding(const Vec6& L_dot) const noexcept;
   /// [m/s^2] behind the wrench's filter.
   Vec6 filteredAcceleration() const noexcept { return filter_.output().matrix(); }

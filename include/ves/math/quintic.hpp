@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+//
+// Fifth-order polynomials between two states.
 #pragma once
 
 #include <Eigen/Core>

@@ -29,7 +29,7 @@ enum class Fault {
   kLegOutOfRange,  // leg `index` reads what no 14-bit counter can
   kValveStuck,     // the valve of leg `index` stays shut
   kRunaway,        // the valve of leg `index` stays open
-  kJointsLost,     // the robot's joint angles are no numbers
+  kJointsLost,     // the robot's joint angles are NaN
   kLost,           // samples do not arrive
   kLate,           // samples arrive `amount` calls later
   kShuffled,       // every other sample is an old one

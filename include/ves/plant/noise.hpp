@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+//
+// Seeded Gaussian noise.
 #pragma once
 
 #include <gsl/gsl_randist.h>

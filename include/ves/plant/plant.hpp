@@ -5,7 +5,7 @@
 //   every 341 us   six Temposonics readings into six LegSlaves
 //   every 1023 us  new valve currents (a LegSlave's second reading), and half a period later, in
 //   the
-//                  middle of the constant current, one look at the mechanics: forward kinematics,
+//                  middle of the constant current, one step of the mechanics: forward kinematics,
 //                  Newton-Euler on the moving base, force-torque sensor
 //   when asked     a sample, at that very moment
 //
@@ -76,7 +76,7 @@ struct PlantConfig {
 /// What nobody but a simulation can know; the controller never reads it.
 struct Truth {
   std::int64_t time = 0;  // [ns]
-  BodyMotion P;           // platform; its accelerations are means since the last look
+  BodyMotion P;           // platform; its accelerations are means since the last step
   Pose x;                 // about home
   Wrench F_Po_I;          // on the platform from all the sensor carries
   JointState joints;
@@ -107,7 +107,7 @@ class Plant {
   /// What the controller gets to see, taken now.
   Sample sample() noexcept;
 
-  /// As of the last look at the mechanics; now, right after sample().
+  /// As of the last step of the mechanics; now, right after sample().
   const Truth& truth() const noexcept { return truth_; }
   std::int64_t time() const noexcept { return now_; }  // [ns]
 
@@ -120,7 +120,7 @@ class Plant {
   bool now(const Cue& cue, std::int64_t duration) const noexcept;
   double current(std::size_t leg) const noexcept;
   void readTransducers() noexcept;
-  void look() noexcept;
+  void stepMechanics() noexcept;
   void planRobotEvent() noexcept;
   void startRobotEvents() noexcept;
   Wrench sensorLoad() const noexcept;
@@ -135,14 +135,14 @@ class Plant {
   ForceTorqueSensor sensor_;
   Butterworth2<kLegs> filter_position_;
   Butterworth3<kLegs> filter_velocity_, filter_acceleration_;
-  ForceTorqueSensor::Step sensor_step_;  // for looks one update period apart
+  ForceTorqueSensor::Step sensor_step_;  // for steps one update period apart
   Butterworth2<kLegs>::Step position_step_;
   Butterworth3<kLegs>::Step rate_step_;
 
   std::int64_t now_ = 0;                           // [ns] actuators are here
-  std::int64_t last_look_ = 0;                     // [ns] mechanics and sensor are here
+  std::int64_t last_step_ = 0;                     // [ns] mechanics and sensor are here
   std::int64_t next_reading_ = kTransducerPeriod;  // [ns]
-  std::int64_t next_look_ = 0;                     // [ns]
+  std::int64_t next_step_ = 0;                     // [ns]
   std::int64_t sequence_ = -1;
   std::int64_t segment_ = -1;                           // of the last command
   std::int64_t segment_start_ = 0;                      // [ns]

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+//
+// Latencies: histograms on the bus, medians and tails for people.
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+//
+// The clock, the periodic loop, and the privileges of a real-time process.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+//
+// The sensor's drift over a run, sample by sample (4.1.2).
 #pragma once
 
 #include <vector>

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+//
+// Figures of a page, as SVG.
 #pragma once
 
 #include <string>

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+//
+// Runs gnuplot.
 #pragma once
 
 #include <filesystem>

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+//
+// Pictures of a run.
 #pragma once
 
 #include <filesystem>

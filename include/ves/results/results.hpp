@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+//
+// The folder that a run leaves, and the line that shows how far it is.
 #pragma once
 
 #include <filesystem>

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+//
+// The stretches of a run in which everything stands still.
 #pragma once
 
 #include "ves/identification/mass_parameters.hpp"

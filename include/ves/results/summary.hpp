@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+//
+// A run in named numbers.
 #pragma once
 
 #include <nlohmann/json.hpp>

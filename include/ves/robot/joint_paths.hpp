@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+//
+// Motions of the simulated robot's joints.
 #pragma once
 
 #include <cstdint>

@@ -14,7 +14,7 @@ struct ProperMotion {
   Vec3 a = Vec3::Zero();      // [m/s^2] a_IBo_B - g_B
 };
 
-/// What the frame B, posed in P, feels when P moves as given and gravity pulls with g_I.
+/// Proper motion of the frame B, posed in P, when P moves as given under gravity g_I.
 ProperMotion properMotion(const BodyMotion& P, const Transform& X_PB, const Vec3& g_I) noexcept;
 
 /// Wrench about Bo in B that must act on the body for it to move so: Newton's and Euler's equation.
@@ -25,11 +25,11 @@ struct InverseDynamics {
   JointVector tau = JointVector::Zero();  // [N m | N] joint efforts
 };
 
-/// Efforts and base wrench for joint motion `q` on a base L0 that feels `L0`.
+/// Efforts and base wrench for joint motion `q` on a base with the proper motion `L0`.
 ///
 /// Departures from the page: link 0 (20 kg of the PUMA) has its own term, prismatic joints are
 /// included, and gravity comes with the base's motion. The recursion's wrench acts *on* the robot;
-/// the sensor feels its negative.
+/// the sensor measures its negative.
 InverseDynamics newtonEuler(const RobotModel& robot, const JointState& q,
                             const ProperMotion& L0) noexcept;
 

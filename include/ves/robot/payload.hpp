@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+//
+// What the force-torque sensor carries.
 #pragma once
 
 #include "ves/robot/robot_model.hpp"

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+//
+// The last seconds before a stop, kept without heap and written afterwards.
 #pragma once
 
 #include <filesystem>

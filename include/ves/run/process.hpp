@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+//
+// Child processes.
 #pragma once
 
 #include <sys/types.h>

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+//
+// When a run is over, and how it ended.
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+//
+// Modes of a beam frame.
 #pragma once
 
 #include "ves/control/admittance_model.hpp"

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+//
+// The names of the channels on the bus.
 #pragma once
 
 #include <string>

@@ -11,6 +11,13 @@
 
 namespace ves {
 
+// The digits that the comments of state_t.lcm and operator_t.lcm name.
+static_assert(static_cast<int>(Check::kCount) == 20);
+static_assert(static_cast<int>(SegmentKind::kPath) == 5 &&
+              static_cast<int>(SegmentKind::kCount) == 6);
+static_assert(static_cast<int>(Request::kUncompensate) == 9);
+static_assert(static_cast<int>(Phase::kStopping) == 6);
+
 /// Calls f(name, value) for every field of a message but its header; lists are arrays.
 template <typename F>
 void forEachField(const state_t& m, F f) {

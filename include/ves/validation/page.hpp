@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+//
+// A self-contained HTML page of claims, figures and tables.
 #pragma once
 
 #include <string>
