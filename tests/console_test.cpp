@@ -247,7 +247,7 @@ TEST_F(Console, OrdersOverTheBusAreForOneController) {
 }
 
 TEST_F(Console, LcmLogplayerPlaysSamplesIntoALiveController) {
-  if (sh("command -v lcm-logplayer").status != 0) GTEST_SKIP() << "no lcm-logplayer";
+  ASSERT_EQ(sh("command -v lcm-logplayer").status, 0) << "liblcm-bin is not installed";
   enterPrivateBus();
   const Output recorded = sh(app("run") + "z_sine --no-plots " + patient() + " --set '" +
                              kShortProgram + "'" + out("a"));

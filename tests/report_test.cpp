@@ -31,6 +31,7 @@ TEST(CoupledModes, AreTheRootsOfBaseAndRobotTogether) {
   S.bottomLeftCorner(6, 6) = -A.inverse() * Eigen::MatrixXd(i.base.stiffness.asDiagonal());
   S.bottomRightCorner(6, 6) = -A.inverse() * i.base.damping;
   const Eigen::VectorXcd roots = S.eigenvalues();
+  ASSERT_EQ(coupledModes(i).size(), 6u);
   for (const CoupledMode& mode : coupledModes(i)) {
     const std::complex<double> expected =
         std::polar(2 * M_PI * mode.frequency, M_PI / 2 + std::asin(mode.damping_ratio));
@@ -41,6 +42,7 @@ TEST(CoupledModes, AreTheRootsOfBaseAndRobotTogether) {
 TEST(RingDown, FitsADecayThatIsKnown) {
   const Interaction i = interaction("srms_unberth_puma");
   const std::vector<CoupledMode> modes = coupledModes(i);
+  ASSERT_FALSE(modes.empty());
   for (const CoupledMode& mode : modes) {
     const double zeta = 0.07, w = 2 * M_PI * 1.02 * mode.frequency;
     Motion motion;

@@ -110,10 +110,10 @@ TEST_F(Sweep, RowsDoNotDependOnTheWorkersNorOnAKill) {
   ASSERT_EQ(sweep(kRuns + out("one") + "--workers 1").status, 0);
   ASSERT_EQ(sweep(kRuns + out("three") + "--workers 3").status, 0);
   const std::string all = csv("one");
-  const auto one = rows(folder_ / "one/sweep.csv");
-  EXPECT_EQ(one.size(), 12u);
+  const auto alone = rows(folder_ / "one/sweep.csv");
+  EXPECT_EQ(alone.size(), 12u);
   std::set<std::string> errors;
-  for (auto row : one) {
+  for (auto row : alone) {
     EXPECT_EQ(row["ended"], "parked");
     errors.insert(row["x_error_max_m"]);
   }

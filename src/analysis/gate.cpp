@@ -119,7 +119,7 @@ std::string explain(const LoopVerdict& v) {
   return fmt::format(
       "the loop of base, robot and machine would diverge: {:.2f} Hz, most in {}, doubling every "
       "{:.2g} s (legs {}). What cures it: {}",
-      v.worst.frequency, coordinate(i).name, std::log(2.0) / v.worst.growth,
+      v.worst.frequency, coordinate(static_cast<int>(i)).name, std::log(2.0) / v.worst.growth,
       v.direction == Direction::kExtending ? "extending" : "retracting", cure);
 }
 

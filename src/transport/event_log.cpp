@@ -43,7 +43,11 @@ void LogWriter::write(const std::string& channel, const void* data, std::int64_t
 }
 
 void LogEvent::refuse(const std::string& log, const char* type) const {
-  throw InputError(fmt::format("{}: byte {}: not a {} of this version", log, offset, type));
+  throw InputError(
+      fmt::format("{}: byte {}: this is no {} of schema {}, which this program reads (another "
+                  "version wrote it, or "
+                  "it is damaged)",
+                  log, offset, type, kSchema));
 }
 
 LogReader::LogReader(const std::string& path) : path_(path) {

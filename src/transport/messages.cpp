@@ -190,6 +190,7 @@ std::optional<experiment_t> decode<experiment_t>(const void* data, std::int64_t 
   }
   experiment_t message;
   if (at != size || message.decode(data, 0, static_cast<int>(size)) != size) return {};
+  if (message.schema != kSchema) return {};
   return message;
 }
 
