@@ -63,7 +63,7 @@ const Parameter kParameters[] = {
        l.robot_P = heavier(v, o.robot_P);
        l.model.robot_P = l.robot_P;
      }},
-    {"mass_error", "robot's inertia, times what the controller believes", 0.0, 100.0,
+    {"mass_error", "robot's inertia, times the controller's model", 0.0, 100.0,
      [](Loop& l, const Loop& o, double v) { l.robot_P = heavier(v, o.robot_P); }},
     {"rate", "controller rate [Hz]", 1.0, 1000.0,
      [](Loop& l, const Loop&, double v) { l.period = 1.0 / v; }},
@@ -72,7 +72,7 @@ const Parameter kParameters[] = {
        l.velocity_gain = v * o.velocity_gain;
        l.model.setGain(v * o.model.gain());
      }},
-    {"gain_error", "servo gain, times what the controller believes", 0.01, 100.0,
+    {"gain_error", "servo gain, times the controller's model", 0.01, 100.0,
      [](Loop& l, const Loop& o, double v) { l.velocity_gain = v * o.velocity_gain; }},
     {"delay", "further delay [ticks]", 0.0, 50.0,
      [](Loop& l, const Loop& o, double v) { l.delay = o.delay + static_cast<int>(v); }},

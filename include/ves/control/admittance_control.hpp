@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Admittance control: the admittance model, envelope_scale before the limits, its energy watched.
+// Admittance control: the admittance model, slowed before the limits, its energy watched.
 #pragma once
 
 #include "ves/control/controller_config.hpp"

@@ -54,7 +54,7 @@ class AdmittanceModel {
   void step(const Wrench& F_Po_I, const Mat6& M_1, double share) noexcept;
 
   /// Takes back all but `share` of the last step, and of the rate it led to: all modes alike, so
-  /// the path stays and only the motion along it is envelope_scale.
+  /// the path stays and only the motion along it is slowed.
   void slow(double share) noexcept;
 
   /// [J] the modes are mass-normalised.

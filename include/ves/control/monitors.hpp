@@ -20,7 +20,7 @@ class LegSpeed {
   Vec6 speed_ = Vec6::Zero();
 };
 
-/// Readings of the legs: one that no leg can have reached since the last is not model; the one
+/// Readings of the legs: one that no leg can have reached since the last is rejected; the one
 /// before is kept. Twice in a row is a fault.
 class LegReadings {
  public:

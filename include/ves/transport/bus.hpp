@@ -73,7 +73,7 @@ void enterPrivateBus();
 ///
 /// A machine that was started anew takes the place of the old one while nothing is engaged. From
 /// then on the machine is the machine: samples of another are not let in and count as a
-/// conflicting_node.
+/// conflict.
 class ControllerLink {
  public:
   ControllerLink(Bus& bus, const Identity& self);
