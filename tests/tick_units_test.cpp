@@ -612,6 +612,21 @@ TEST(Supervisor, ARequestToArmDoesNotOutliveACause) {
   EXPECT_EQ(desk.supervisor.phase(), Phase::kArmed);
 }
 
+TEST(Supervisor, ACauseThatComesWhileTheStreamIsAwaitedDropsTheRequest) {
+  Desk desk(puma());
+  desk.stream.restart();
+  EXPECT_EQ(desk.order(Request::kArm).refusal, Refusal::kNone);
+  desk.tripped = only(Check::kPanicButton);
+  desk.advance();
+  desk.tripped = {};
+  desk.advance();
+  desk.advance();
+  for (int n = 100; n <= 100 + desk.c.arming_samples; ++n)
+    desk.stream.update(numbered(n), false, false);
+  desk.advance();
+  EXPECT_EQ(desk.supervisor.phase(), Phase::kDisarmed);
+}
+
 TEST(Supervisor, AStopBrakesFromMotionAndFreezesAtOnceFromRest) {
   Desk desk(puma());
   desk.arm();
