@@ -9,6 +9,7 @@
 #include "support/refusal.hpp"
 #include "support/robots.hpp"
 #include "ves/console/command.hpp"
+#include "ves/console/form.hpp"
 #include "ves/realtime/realtime.hpp"
 #include "ves/run/bus_observer.hpp"
 
@@ -96,6 +97,55 @@ INSTANTIATE_TEST_SUITE_P(
         BadLine{"move x", "x: missing"}, BadLine{"robot joint_7 1 1", "'joint_7', want one of"},
         BadLine{"robot joint_1 1e3 1", "joint_1: '1e3', want a number in"},
         BadLine{"collect", "file: missing"}, BadLine{"arm now", "'now': one word too many"}));
+
+// --- Forms ---------------------------------------------------------------------------------------
+
+/// A form filled by these lines; what was said meanwhile goes to `said`.
+std::optional<std::string> filled(const std::string& word, std::vector<std::string> lines,
+                                  std::string* said = nullptr) {
+  std::reverse(lines.begin(), lines.end());
+  const auto next = [&](const std::string&) -> std::optional<std::string> {
+    if (lines.empty()) return {};
+    const std::string line = lines.back();
+    lines.pop_back();
+    return line;
+  };
+  const auto say = [&](const std::string& text) {
+    if (said) *said += text;
+  };
+  return fillForm(word, puma(), {next, say, [](int) { return "0"; }});
+}
+
+TEST(Forms, MakeTheCommandLineThatCouldHaveBeenTyped) {
+  EXPECT_EQ(filled("admittance", {""}), "admittance 10");
+  EXPECT_EQ(filled("trajectory", {" 2 ", "", "", "sine", "30", "0.5", "ramp", "5", "", ""}),
+            "trajectory 2 z sine 30 0.5 alpha ramp 5");
+  EXPECT_EQ(filled("arm", {}), "arm");
+  const auto line = filled("move", {"1", "2", "3", "4", "5", "6"});
+  EXPECT_EQ(line, "move x 1 y 2 z 3 alpha 4 beta 5 gamma 6");
+  EXPECT_EQ(parseCommand(*line, puma()).order.segment.target.p.x(), 0.001);
+}
+
+TEST(Forms, AskAgainForWhatIsOutOfRange) {
+  std::string said;
+  EXPECT_EQ(filled("admittance", {"ten", "-1", "nan", "7"}, &said), "admittance 7");
+  EXPECT_NE(said.find("'nan', want a number in"), std::string::npos) << said;
+}
+
+TEST(Forms, HoldAndStopAreObeyedAndBackLeaves) {  // wherever the form stands
+  for (std::size_t n = 0; n < 6; ++n) {
+    const auto left = [&](const std::string& word) {
+      std::vector<std::string> lines(n, "");
+      lines.push_back(word);
+      return filled("trajectory", lines);
+    };
+    EXPECT_EQ(left("hold"), "hold");
+    EXPECT_EQ(left(" stop "), "stop");
+    EXPECT_EQ(left("back"), "");
+    EXPECT_EQ(left("\033"), "");
+  }
+  EXPECT_FALSE(filled("move", {"1"}));  // the input ended
+}
 
 // --- A session -----------------------------------------------------------------------------------
 

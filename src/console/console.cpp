@@ -10,8 +10,10 @@
 #include <fstream>
 
 #include "collector.hpp"
+#include "texts.hpp"
 #include "ves/base/coordinates.hpp"
 #include "ves/console/command.hpp"
+#include "ves/console/form.hpp"
 #include "ves/realtime/realtime.hpp"
 #include "ves/results/series.hpp"
 #include "ves/run/session.hpp"
@@ -20,14 +22,7 @@
 namespace ves {
 namespace {
 
-constexpr const char* kChannel[] = {"Fx", "Fy", "Fz", "Mx", "My", "Mz"};
 constexpr int kTurn = 50;  // [ms] between looks at what happens
-
-std::string poseText(const double (&x)[6]) {
-  return fmt::format(
-      "x {:+.1f}  y {:+.1f}  z {:+.1f} mm   alpha {:+.2f}  beta {:+.2f}  gamma {:+.2f} deg",
-      x[0] * 1e3, x[1] * 1e3, x[2] * 1e3, x[3] / kDegree, x[4] / kDegree, x[5] / kDegree);
-}
 
 class Console {
  public:
@@ -80,9 +75,11 @@ class Console {
   void help() {
     for (std::size_t i = 0; i < menu().size(); ++i)
       say(fmt::format("  {:>2} {:<13}{}", i + 1, menu()[i].word, menu()[i].what));
-    say("A number, a word or its beginning; lengths in mm, angles in deg. All at once, for "
-        "example:\n"
-        "trajectory 3 z sine 200 0.5, or: move in 4 x 50 beta 4. Ctrl-C: home, and done.");
+    say("A number, a word or its beginning; lengths in mm, angles in deg. A word alone asks for "
+        "the "
+        "rest;\n`back` leaves its questions, `hold` and `stop` act at once. In one line, for "
+        "example:\ntrajectory 3 z sine 200 0.5, or: move in 4 x 50 beta 4. Ctrl-C: home, and "
+        "done.");
   }
 
   void notice(const state_t& s) {
@@ -117,42 +114,10 @@ class Console {
       if (status == Calibration::Status::kDone) keepCalibration(s);
       if (status == Calibration::Status::kRefused) {
         failed_ = failed_ || !script_.empty();
-        say(fmt::format("calibration refused: {}; the bias is as before", evidence(s)));
+        say(fmt::format("calibration refused: {}; the bias is as before",
+                        evidence(s, experiment_)));
       }
     }
-  }
-
-  static std::string failing(std::int32_t bits) {
-    return names(Tripped(static_cast<std::uint32_t>(bits)));
-  }
-
-  std::string evidence(const state_t& s) const {
-    const auto i = static_cast<std::size_t>(s.violation_index);
-    const StillnessLimits& limits = experiment_.controller.stillness;
-    switch (static_cast<StillnessViolation>(s.violation)) {
-      case StillnessViolation::kLeg:
-        return fmt::format("leg {} moved by {} counts ({} allowed)", i + 1, s.violation_amount,
-                           limits.leg_counts);
-      case StillnessViolation::kJoint: {
-        const bool known = i < experiment_.joint_names.size();
-        const bool turns =
-            known && experiment_.controller.payload.robot.link(s.violation_index).type ==
-                         JointType::kRevolute;
-        return fmt::format("{} moved by {:.4f} {} ({} allowed)",
-                           known ? experiment_.joint_names[i] : fmt::format("joint {}", i + 1),
-                           s.violation_amount, turns ? "rad" : "m", limits.joint);
-      }
-      case StillnessViolation::kChannel:
-        return fmt::format("{} scatters by {:.1f} counts ({} allowed): something shakes it",
-                           i < 6 ? kChannel[i] : "a channel", s.violation_amount, limits.deviation);
-      case StillnessViolation::kBias:
-        return fmt::format(
-            "{} would have a bias of {:.0f} counts ({:.0f} allowed): it carries a load "
-            "that is not in the model, or less than that",
-            i < 6 ? kChannel[i] : "a channel", s.violation_amount, limits.bias);
-      case StillnessViolation::kNone: break;
-    }
-    return "no stream of new samples";
   }
 
   void keepCalibration(const state_t& s) {
@@ -166,8 +131,8 @@ class Console {
     calibration_ = record;
     std::string table = "calibrated  bias          of a sample  standard error [count]\n";
     for (int i = 0; i < 6; ++i)
-      table += fmt::format("      {}  {:10.2f}    {:10.2f}    {:10.3f}\n", kChannel[i], s.bias[i],
-                           s.deviation[i], s.standard_error[i]);
+      table += fmt::format("      {}  {:10.2f}    {:10.2f}    {:10.3f}\n", wrenchComponent(i).name,
+                           s.bias[i], s.deviation[i], s.standard_error[i]);
     std::error_code error;
     std::filesystem::create_directories(options_.calibration.parent_path(), error);
     std::ofstream file(options_.calibration);
@@ -175,37 +140,6 @@ class Console {
     file.flush();
     say(table + (file ? "  kept in " : "  could NOT be written to ") +
         options_.calibration.string());
-  }
-
-  void status() {
-    if (!session_->state()) {
-      say("nothing heard of the controller yet");
-      return;
-    }
-    const state_t& s = *session_->state();
-    const auto kind = static_cast<SegmentKind>(s.kind);
-    say(fmt::format("  phase      {}{}", name(static_cast<Phase>(s.phase)),
-                    kind == SegmentKind::kCount ? "" : fmt::format(", {}", name(kind))));
-    say("  commanded  " + poseText(s.x));
-    say("  measured   " + poseText(s.x_measured));
-    say(fmt::format(
-        "  wrench     {:+.2f} {:+.2f} {:+.2f} N   {:+.3f} {:+.3f} {:+.3f} N m, gravity "
-        "taken out",
-        s.dynamic[0], s.dynamic[1], s.dynamic[2], s.dynamic[3], s.dynamic[4], s.dynamic[5]));
-    say(calibration_
-            ? fmt::format("  bias       of {}, {:.1f} h old, at {:.1f} C; now {:.1f} C{}",
-                          dateText(calibration_->date), age(*calibration_),
-                          calibration_->temperature, temperature_,
-                          age(*calibration_) > kCalibrationKeeps ? "; calibrate again" : "")
-            : std::string("  bias       none: not calibrated"));
-    say(fmt::format("  checks     {}", s.tripped ? failing(s.tripped) + " failing" : "all pass"));
-    if (timing_)
-      say(fmt::format(
-          "  timing     woke {:.0f} us late, computed {:.0f} us; sample {:.1f} ms old; {} "
-          "ticks missed",
-          static_cast<double>(timing_->late_ns) * 1e-3,
-          static_cast<double>(timing_->compute_ns) * 1e-3,
-          static_cast<double>(timing_->sample_age_ns) * 1e-6, timing_->missed));
   }
 
   // --- What the person says ----------------------------------------------------------------------
@@ -236,107 +170,6 @@ class Console {
     return out;
   }
 
-  using Accept = std::function<void(const std::string&)>;  // throws InputError
-
-  /// The same, with a word for an empty line; asked again until `accept` has nothing to say.
-  std::optional<std::string> answer(const std::string& question, const std::string& otherwise,
-                                    const Accept& accept) {
-    for (;;) {
-      auto text = line(fmt::format("  {} [{}]: ", question, otherwise));
-      if (!text) return text;
-      if (text->find_first_not_of(" \t\r") == std::string::npos) text = otherwise;
-      try {
-        if (accept) accept(*text);
-        return text;
-      } catch (const InputError& error) {
-        say(std::string("    ") + error.what());
-      }
-    }
-  }
-
-  /// Asks for what a bare verb leaves open, coordinate by coordinate, as Appendix C describes.
-  std::optional<std::string> complete(const std::string& word) {
-    const Verb verb = parseVerb(word);
-    const SafetyLimits& limits = experiment_.controller.safety;
-    std::string out = word;
-    const auto add = [&](const std::string& question, const std::string& otherwise,
-                         const Accept& accept = nullptr) {
-      const auto text = answer(question, otherwise, accept);
-      if (text) out += " " + *text;
-      return text.has_value();
-    };
-    const auto between = [](double lo, double hi, const char* unit) {
-      return [=](const std::string& text) { parseNumber(text, "that", lo, hi, unit); };
-    };
-    const auto reach = [&](int i) {
-      const Coordinate& c = coordinate(i);
-      const double most = (i < 3 ? limits.translation : limits.rotation) * c.shown;
-      return between(-most, most, i < 3 ? "mm" : "deg");
-    };
-    const auto seconds = between(0.01, 1e5, "s");
-    switch (verb) {
-      case Verb::kAdmittance:
-        if (!add("seconds", "10", seconds)) return {};
-        break;
-      case Verb::kWait:
-        if (!add("seconds", "1", seconds)) return {};
-        break;
-      case Verb::kTrajectory: {
-        if (!add("seconds", "3", seconds)) return {};
-        for (int i = 0; i < 6; ++i) {
-          const std::string c(coordinate(i).name), unit(coordinate(i).shown_unit);
-          const auto motion =
-              answer(fmt::format("{}, now {} {}: hold, ramp or sine", c, now(i), unit), "hold",
-                     [](const std::string& text) {
-                       if (text != "hold" && text != "ramp" && text != "sine")
-                         throw InputError(fmt::format("'{}', want hold, ramp or sine", text));
-                     });
-          if (!motion) return {};
-          if (*motion == "hold") continue;
-          out += " " + c + " " + *motion;
-          if (*motion == "ramp") {
-            if (!add(fmt::format("  {} at the end, {}", c, unit), "0", reach(i))) return {};
-          } else if (!add("  amplitude, " + unit, "0", reach(i)) ||
-                     !add("  frequency, Hz", "0.5", between(0.0, 50.0, "Hz"))) {
-            return {};
-          }
-        }
-        break;
-      }
-      case Verb::kMove:
-        for (int i = 0; i < 6; ++i) {
-          out += fmt::format(" {}", coordinate(i).name);
-          if (!add(fmt::format("{}, now {} {}", coordinate(i).name, now(i),
-                               coordinate(i).shown_unit),
-                   "0", reach(i)))
-            return {};
-        }
-        break;
-      case Verb::kRobot:
-        if (!add(fmt::format("joint, one of {}", fmt::join(experiment_.joint_names, " ")),
-                 experiment_.joint_names.empty() ? "none" : experiment_.joint_names[0]) ||
-            !add("to, deg or mm", "0", between(-1e4, 1e4, "deg or mm")) ||
-            !add("seconds", "5", seconds))
-          return {};
-        break;
-      case Verb::kCollect:
-        if (!add("file", "collected.csv") || !add("seconds", "10", seconds) ||
-            !add("rows per second", "100", between(1e-4, 1e4, "Hz")) ||
-            !add("variables: beginnings of names, as in series.csv",
-                 "x_ y_ z_ fx_dynamic fy_dynamic fz_dynamic"))
-          return {};
-        break;
-      default: break;
-    }
-    return out;
-  }
-
-  std::string now(int i) const {
-    if (!session_->state()) return "?";
-    const double x = session_->state()->x[i];
-    return fmt::format("{:+.{}f}", x * coordinate(i).shown, i < 3 ? 1 : 2);
-  }
-
   void ask() {
     if (terminal_) help();
     while (!over()) {
@@ -345,8 +178,9 @@ class Console {
       if (text->find_first_not_of(" \t\r") == std::string::npos) continue;
       try {
         if (terminal_ && text->find(' ') == std::string::npos) {
-          text = complete(*text);
+          text = fillForm(*text, experiment_, person_);
           if (!text) return;
+          if (text->empty()) continue;
         }
         if (!obey(parseCommand(*text, experiment_))) return;
       } catch (const InputError& error) {
@@ -362,7 +196,11 @@ class Console {
   bool obey(const Command& command) {
     switch (command.verb) {
       case Verb::kHelp: help(); break;
-      case Verb::kStatus: status(); break;
+      case Verb::kStatus:
+        say(session_->state()
+                ? statusText({*session_->state(), timing_, calibration_, temperature_})
+                : "nothing heard of the controller yet");
+        break;
       case Verb::kCollect:
         if (collector_) say(collector_->outcome());
         collector_.emplace(experiment_, command.collection);
@@ -473,6 +311,12 @@ class Console {
   const Experiment& experiment_;
   const ConsoleOptions& options_;
   Session* session_ = nullptr;
+  const Questioner person_{[this](const std::string& prompt) { return line(prompt); },
+                           [this](const std::string& text) { say(text); },
+                           [this](int i) {
+                             const auto& state = session_->state();
+                             return state ? coordinateText(i, state->x[i]) : "?";
+                           }};
   bool terminal_;
   std::vector<Command> script_;
   bool failed_ = false;
