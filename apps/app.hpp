@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// What the programs share: their options, Ctrl-C, and the three exit statuses.
+// What the commands share: their options, Ctrl-C, and the three exit statuses.
 #pragma once
 
 #include <fmt/format.h>
@@ -98,8 +98,29 @@ inline void requireStability(Experiment& experiment) {
   fmt::print(stderr, "warning: {}\n", why);
 }
 
+/// Asks a command for the words that may be completed.
+inline constexpr const char* kWords = "--words";
+
+inline void printWords(const CLI::App& cli) {
+  for (const CLI::App* sub : cli.get_subcommands(nullptr)) {
+    fmt::print("{} ", sub->get_name());
+    printWords(*sub);
+  }
+  for (const CLI::Option* option : cli.get_options())
+    for (const std::string& name : option->get_lnames()) fmt::print("--{} ", name);
+}
+
+/// This very program, to start its other processes.
+inline std::filesystem::path ownProgram() {
+  return std::filesystem::read_symlink("/proc/self/exe");
+}
+
 /// Parses, runs, and turns bad input into one line and status 2.
 inline int run(CLI::App& cli, int argc, char** argv, const std::function<int()>& body) {
+  if (argc == 2 && std::string_view(argv[1]) == kWords) {
+    printWords(cli);
+    return kDone;
+  }
   try {
     cli.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -6,10 +6,12 @@
 #include <iostream>
 
 #include "app.hpp"
+#include "commands.hpp"
 #include "ves/results/series.hpp"
 
-int main(int argc, char** argv) {
-  using namespace ves;
+namespace ves::app {
+
+int collectCommand(int argc, char** argv) {
   CLI::App cli("Takes variables out of a log, as CSV with the unit in every column's name.",
                "ves collect");
   std::string log, out;
@@ -21,12 +23,11 @@ int main(int argc, char** argv) {
                  "columns, or beginnings of their names: z_ fx_dynamic; all by default");
   cli.add_flag("--list", list, "only the names of the columns");
   cli.add_option("--rate", rate, "[Hz] rows per second; every tick by default")
-      ->check(app::inRange(1e-6, 1e6));
-  cli.add_option("--from", from, "[s] since the first tick")->check(app::inRange(0.0, 1e9));
-  cli.add_option("--duration", duration, "[s]; to the end by default")
-      ->check(app::inRange(0.0, 1e9));
+      ->check(inRange(1e-6, 1e6));
+  cli.add_option("--from", from, "[s] since the first tick")->check(inRange(0.0, 1e9));
+  cli.add_option("--duration", duration, "[s]; to the end by default")->check(inRange(0.0, 1e9));
   cli.add_option("--out", out, "file; standard output by default");
-  return app::run(cli, argc, argv, [&] {
+  return run(cli, argc, argv, [&] {
     const Series series = readSeries(log);
     std::vector<Column> chosen;
     std::vector<bool> used(select.size(), false);
@@ -57,6 +58,8 @@ int main(int argc, char** argv) {
     }
     to.flush();
     if (!to) throw InputError(fmt::format("--out {}: cannot be written", out));
-    return app::kDone;
+    return kDone;
   });
 }
+
+}  // namespace ves::app

@@ -3,6 +3,7 @@
 // ves controller: testPlatform, with its menu or as a process that takes its orders from the bus.
 #include <unistd.h>
 
+#include "commands.hpp"
 #include "runner.hpp"
 #include "ves/console/console.hpp"
 
@@ -75,16 +76,14 @@ int console(ControllerOptions& options) {
 }
 
 }  // namespace
-}  // namespace ves::app
 
-int main(int argc, char** argv) {
-  using namespace ves;
+int controllerCommand(int argc, char** argv) {
   CLI::App cli(
       "The controller (testPlatform). On a terminal, or with --do: its menu, over a controller "
       "process that it starts and records. Otherwise that process alone, which takes orders from "
       "the bus (VES_OPERATOR) and moves nothing without one.",
       "ves controller");
-  app::ControllerOptions options;
+  ControllerOptions options;
   options.addExperiment(cli);
   options.addForce(cli);
   options.addBus(cli);
@@ -101,11 +100,13 @@ int main(int argc, char** argv) {
   cli.add_option("--flight", options.process.flight,
                  "folder for the last 5 s before a stop, as a log of their own (no menu)");
   cli.add_flag("!--no-plots", options.plots, "leave the plots out");
-  return app::run(cli, argc, argv, [&] {
+  return run(cli, argc, argv, [&] {
     const bool alone = options.no_menu || options.process.start || options.process.lockstep;
     if (!options.commands.empty() && alone)
       throw InputError("--do: not with --no-menu, --start or --lockstep");
-    return alone || (options.commands.empty() && !isatty(STDIN_FILENO)) ? app::serve(options)
-                                                                        : app::console(options);
+    return alone || (options.commands.empty() && !isatty(STDIN_FILENO)) ? serve(options)
+                                                                        : console(options);
   });
 }
+
+}  // namespace ves::app

@@ -1,17 +1,21 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // ves demo: the main job. PUMA 560 on a compliant base, two processes, real time.
+#include "commands.hpp"
 #include "runner.hpp"
 
-int main(int argc, char** argv) {
-  using namespace ves;
+namespace ves::app {
+
+int demoCommand(int argc, char** argv) {
   CLI::App cli(
       "The main job, in real time: controller and plant as two processes over LCM, a PUMA 560 "
       "on a compliant base, about 20 s.",
       "ves demo");
-  app::RunnerOptions options;
+  RunnerOptions options;
   options.scenario = "puma_on_table_4_1";
   cli.add_option("--out", options.out, "folder for the results; a new one in ves-runs by default");
   options.addBus(cli);
-  return app::run(cli, argc, argv, [&] { return app::runExperiment(options); });
+  return run(cli, argc, argv, [&] { return runExperiment(options); });
 }
+
+}  // namespace ves::app

@@ -4,14 +4,14 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include "commands.hpp"
 #include "runner.hpp"
 #include "ves/doctor/doctor.hpp"
 #include "ves/results/summary.hpp"
 #include "ves/run/process.hpp"
 
+namespace ves::app {
 namespace {
-
-using namespace ves;
 
 void show(const Finding& f) {
   const char* mark = f.state == Finding::State::kGood     ? "ok    "
@@ -37,6 +37,7 @@ nlohmann::json ourLoop(double seconds, const std::string& url) {
   const std::filesystem::path folder =
       std::filesystem::temp_directory_path() / fmt::format("ves-doctor-{}", getpid());
   const std::vector<std::string> arguments = {
+      "run",
       "free_decay",
       "--url",
       url,
@@ -45,13 +46,11 @@ nlohmann::json ourLoop(double seconds, const std::string& url) {
       folder.string(),
       "--set",
       fmt::format("program=[{{calibration: {{}}}}, {{admittance: {{duration_s: {}}}}}]", seconds)};
-  const std::filesystem::path programs =
-      std::filesystem::read_symlink("/proc/self/exe").parent_path();
   std::fflush(stdout);
   const int out = dup(STDOUT_FILENO), err = dup(STDERR_FILENO), null = open("/dev/null", O_WRONLY);
   dup2(null, STDOUT_FILENO);
   dup2(null, STDERR_FILENO);
-  Process run(programs / "ves-run", arguments);
+  Process run(ownProgram(), arguments);
   dup2(out, STDOUT_FILENO);
   dup2(err, STDERR_FILENO);
   for (const int fd : {out, err, null}) close(fd);
@@ -65,8 +64,7 @@ nlohmann::json ourLoop(double seconds, const std::string& url) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
-  using namespace ves;
+int doctorCommand(int argc, char** argv) {
   CLI::App cli(
       "Checks this machine for real-time runs: kernel, privileges, clock, bus, and how late things "
       "are, beside cyclictest (when installed) and a bare echo over LCM in the same minute. Status "
@@ -75,10 +73,10 @@ int main(int argc, char** argv) {
   double seconds = 5.0;
   std::string url = kDefaultUrl;
   cli.add_option("--seconds", seconds, "of each measurement")
-      ->check(app::inRange(0.1, 3600.0))
+      ->check(inRange(0.1, 3600.0))
       ->capture_default_str();
   cli.add_option("--url", url, "LCM bus")->capture_default_str();
-  return app::run(cli, argc, argv, [&] {
+  return run(cli, argc, argv, [&] {
     std::vector<Finding> findings = examineMachine();
     const bool shared = busWorks(url);
     bool alone = shared;
@@ -103,7 +101,7 @@ int main(int argc, char** argv) {
       bad |= f.state == State::kBad;
       if (f.what == "scheduler") realtime = f.state == State::kGood;
     }
-    if (!alone) return app::kTripped;
+    if (!alone) return kTripped;
 
     constexpr std::int64_t kPeriod = 10'000'000;  // [ns]
     fmt::print("\n       {:<32}{:>9}{:>9}{:>9}   [us]\n", "how late, at 100 Hz", "median", "99 %",
@@ -127,15 +125,17 @@ int main(int argc, char** argv) {
     const Latency bare = echo(url, times);
     show("LCM there and back", bare, "bare, two processes");
     const Latency ours = response(
-        loadExperiment(app::configFolder() / "scenarios" / "puma_on_table_4_1.yaml"), url, times);
+        loadExperiment(configFolder() / "scenarios" / "puma_on_table_4_1.yaml"), url, times);
     show("sample to command", ours,
          fmt::format("our controller in between: {:.2f} x", ours.median / bare.median));
     if (!ran) {
       fmt::print("BAD    a run of our own did not end well: try ./ves demo\n");
-      return app::kTripped;
+      return kTripped;
     }
     fmt::print("       {} of {} ticks missed\n", loop["ticks_missed"].get<std::int64_t>(),
                loop["ticks"].get<std::int64_t>());
-    return bad ? app::kTripped : app::kDone;
+    return bad ? kTripped : kDone;
   });
 }
+
+}  // namespace ves::app

@@ -2,6 +2,7 @@
 //
 // ves faults: injects every fault of the table and says what happened.
 #include "app.hpp"
+#include "commands.hpp"
 #include "ves/faults/soak.hpp"
 #include "ves/faults/table.hpp"
 
@@ -33,8 +34,8 @@ void printMarkdownRow(const FaultRow& row, const FaultOutcome& seen) {
   std::fflush(stdout);
 }
 
-int kill(const std::filesystem::path& config, const std::filesystem::path& programs, int times) {
-  const auto rows = faultTable(config, programs);
+int kill(const std::filesystem::path& config, const std::filesystem::path& program, int times) {
+  const auto rows = faultTable(config, program);
   const auto row =
       std::find_if(rows.begin(), rows.end(), [](const FaultRow& r) { return r.id == "F15"; });
   int good = 0;
@@ -47,10 +48,8 @@ int kill(const std::filesystem::path& config, const std::filesystem::path& progr
 }
 
 }  // namespace
-}  // namespace ves::app
 
-int main(int argc, char** argv) {
-  using namespace ves;
+int faultsCommand(int argc, char** argv) {
   CLI::App cli(
       "Injects every fault of the table, most in lockstep, some into real processes, and says "
       "what was expected and what happened. Status 1 when a row is not as expected.",
@@ -69,10 +68,10 @@ int main(int argc, char** argv) {
   cli.add_option("--seed", seed, "of the soak");
   cli.add_option("--kill", times, "instead: kill a controller at so many random moments")
       ->check(CLI::Range(1, 100'000));
-  return app::run(cli, argc, argv, [&] {
-    const std::filesystem::path config = app::configFolder();
-    const auto programs = std::filesystem::read_symlink("/proc/self/exe").parent_path();
-    app::catchSignals();
+  return run(cli, argc, argv, [&] {
+    const std::filesystem::path config = configFolder();
+    const std::filesystem::path program = ownProgram();
+    catchSignals();
     if (ticks > 0) {
       const SoakResult r = soak(config, ticks, seed, [&](std::int64_t done) {
         fmt::print(stderr, "\r  {:.1f} of {:.1f} million ticks", static_cast<double>(done) * 1e-6,
@@ -82,14 +81,14 @@ int main(int argc, char** argv) {
       fmt::print("{} ticks, {} faults, {} stops, {} recoveries, hash {:016x}{}\n", r.ticks,
                  r.faults, r.stops, r.recoveries, r.hash,
                  r.violated.empty() ? "" : "\nVIOLATED " + r.violated);
-      return r.violated.empty() ? app::kDone : app::kTripped;
+      return r.violated.empty() ? kDone : kTripped;
     }
-    const auto rows = faultTable(config, programs);
+    const auto rows = faultTable(config, program);
     for (const std::string& id : only)
       if (std::none_of(rows.begin(), rows.end(), [&](const FaultRow& r) { return id == r.id; }))
         throw InputError(fmt::format("'{}': no such row, want one that --list names", id));
     if (!list && !lockstep) enterPrivateBus();
-    if (times > 0) return app::kill(config, programs, times);
+    if (times > 0) return kill(config, program, times);
     if (markdown)
       fmt::print(
           "| | fault | expected | seen | detected [ticks / time] | peak deviation [mm] |\n"
@@ -101,13 +100,15 @@ int main(int argc, char** argv) {
         fmt::print("{:<5} {}\n        {}\n", row.id, row.fault, row.expected);
         continue;
       }
-      if ((lockstep && row.processes) || app::stop_requested) continue;
+      if ((lockstep && row.processes) || stop_requested) continue;
       const FaultOutcome seen = row.run();
-      (markdown ? app::printMarkdownRow : app::printRow)(row, seen);
+      (markdown ? printMarkdownRow : printRow)(row, seen);
       ++ran;
       missed += !seen.as_expected;
     }
     if (!list && !markdown) fmt::print("{} of {} rows as expected\n", ran - missed, ran);
-    return missed == 0 ? app::kDone : app::kTripped;
+    return missed == 0 ? kDone : kTripped;
   });
 }
+
+}  // namespace ves::app

@@ -3,6 +3,7 @@
 // ves identify: what the machine can find out about itself.
 #include <ctime>
 
+#include "commands.hpp"
 #include "runner.hpp"
 #include "ves/config/masses.hpp"
 #include "ves/config/servo.hpp"
@@ -11,9 +12,8 @@
 #include "ves/results/static_intervals.hpp"
 #include "ves/run/iterative_compensation.hpp"
 
+namespace ves::app {
 namespace {
-
-using namespace ves;
 
 constexpr const char* kChannel[] = {"Fx", "Fy", "Fz", "Mx", "My", "Mz"};
 
@@ -31,16 +31,16 @@ auto orRefuse(const std::string& about, const F& f) {
 int keep(const std::string& file, const std::string& yaml, const auto& read) {
   const Value written = parseDocument(yaml, file);
   read(Section(written, ""));
-  app::writeFile(file, yaml);
+  writeFile(file, yaml);
   fmt::print("{}\n", file);
-  return app::kDone;
+  return kDone;
 }
 
 int plan(const std::string& scenario, const PosePlanOptions& options, double speed,
          std::string file) {
-  const std::filesystem::path base = findScenario(scenario, app::configFolder());
+  const std::filesystem::path base = findScenario(scenario, configFolder());
   const Experiment e = loadExperiment(base);
-  app::printWarnings(e);
+  printWarnings(e);
   if (e.joint_names.empty())
     throw InputError(fmt::format("{}: has no robot with joints to identify", base.string()));
   if (!(e.controller.gravity.norm() > 0.0))
@@ -61,13 +61,13 @@ int plan(const std::string& scenario, const PosePlanOptions& options, double spe
   const std::filesystem::path folder = std::filesystem::absolute(file).parent_path();
   const std::string from =
       std::filesystem::proximate(std::filesystem::absolute(base), folder).string();
-  app::writeFile(file, scenarioOf(plan, e, name, from, speed));
+  writeFile(file, scenarioOf(plan, e, name, from, speed));
   loadExperiment(file);  // what is refused is refused now
   fmt::print(
       "{} of {} parameters can be told apart; condition number {:.1f}, of random poses "
       "{:.1f}\n{}\n",
       combinations.rank(), combinations.C.cols(), plan.condition, plan.condition_random, file);
-  return app::kDone;
+  return kDone;
 }
 
 std::vector<StaticInterval> restsIn(const Series& series, const std::string& log) {
@@ -111,7 +111,7 @@ int masses(const std::string& log, const std::string& file) {
         "{} poorly observed: these poses mix it with others, more than {:.0f} times the "
         "deviation it could have\n",
         mixed, MassEstimate::kMixed);
-  if (file.empty()) return app::kDone;
+  if (file.empty()) return kDone;
 
   const Eigen::VectorXd full = completed(combinations, m.beta, massParameters(setup.robot));
   MassRecord record;
@@ -157,14 +157,14 @@ int servo(const std::string& log, const std::string& file) {
                cell(&ServoModel::retract, 1.0), cell(&ServoModel::tau, 1e3),
                cell(&ServoModel::delay, 1e3), found.residual(i) * 1e6);
   }
-  if (file.empty()) return app::kDone;
+  if (file.empty()) return kDone;
   const std::string yaml = write({std::time(nullptr), found.servo, found.deviation});
   return keep(file, yaml, readServo);
 }
 
-int iterate(const app::Options& load, const IterativeOptions& options, const std::string& file) {
+int iterate(const Options& load, const IterativeOptions& options, const std::string& file) {
   const Experiment e = load.load();
-  app::printWarnings(e);
+  printWarnings(e);
   fmt::print("{:>9} {:>22} {:>22}\n", "iteration", "answer - path [mm]", "[deg]");
   int n = 0;
   const IterativeResult r = compensateIteratively(e, options, [&](const IterativeChange& change) {
@@ -183,16 +183,15 @@ int iterate(const app::Options& load, const IterativeOptions& options, const std
     for (const auto& x : r.path.colwise())
       text += fmt::format("  - [{:.7g}, {:.7g}, {:.7g}, {:.7g}, {:.7g}, {:.7g}]\n", x(0), x(1),
                           x(2), x(3) / kDegree, x(4) / kDegree, x(5) / kDegree);
-    app::writeFile(file, text);
+    writeFile(file, text);
     fmt::print("{}\n", file);
   }
-  return r.converged ? app::kDone : app::kTripped;
+  return r.converged ? kDone : kTripped;
 }
 
 }  // namespace
 
-int main(int argc, char** argv) {
-  using namespace ves;
+int identifyCommand(int argc, char** argv) {
   CLI::App cli("What the machine finds out about itself.", "ves identify");
   cli.require_subcommand(1);
   std::string name, file;
@@ -208,10 +207,10 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1, 20))
       ->capture_default_str();
   of_plan->add_option("--tilt", tilt, "most about x and about y [deg]")
-      ->check(app::inRange(0.1, 85.0))
+      ->check(inRange(0.1, 85.0))
       ->capture_default_str();
   of_plan->add_option("--joint-speed", speed, "mean, of the robot's joints [deg/s | cm/s]")
-      ->check(app::inRange(0.1, 1000.0))
+      ->check(inRange(0.1, 1000.0))
       ->capture_default_str();
   of_plan->add_option("--seed", options.seed, "of the search")->check(CLI::Range(0, INT32_MAX));
   of_plan->add_option("--out", file, "scenario file; ves-runs/identify_SCENARIO.yaml by default");
@@ -228,7 +227,7 @@ int main(int argc, char** argv) {
       "iterate",
       "Kuklinski's compensation without a mass model: slow and fast passes of a scenario's robot "
       "motion until the platform's path is the model's answer; the same motion every time");
-  app::Options load;
+  Options load;
   IterativeOptions iterative;
   double millimetres = iterative.translation * 1e3, degrees = iterative.rotation / kDegree;
   load.addExperiment(*of_path);
@@ -236,19 +235,19 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(2, 1000))
       ->capture_default_str();
   of_path->add_option("--weight", iterative.weight, "of the model's answer in the next path")
-      ->check(app::inRange(0.01, 1.0))
+      ->check(inRange(0.01, 1.0))
       ->capture_default_str();
   of_path->add_option("--most", iterative.most, "iterations")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   of_path->add_option("--tolerance-mm", millimetres, "answer less path")
-      ->check(app::inRange(1e-6, 1e3))
+      ->check(inRange(1e-6, 1e3))
       ->capture_default_str();
   of_path->add_option("--tolerance-deg", degrees, "the same")
-      ->check(app::inRange(1e-6, 90.0))
+      ->check(inRange(1e-6, 90.0))
       ->capture_default_str();
   of_path->add_option("--out", file, "file for the path, as a path segment takes it");
-  return app::run(cli, argc, argv, [&] {
+  return run(cli, argc, argv, [&] {
     if (of_path->parsed()) {
       iterative.translation = millimetres * 1e-3;
       iterative.rotation = degrees * kDegree;
@@ -260,3 +259,5 @@ int main(int argc, char** argv) {
     return plan(name, options, speed, file);
   });
 }
+
+}  // namespace ves::app

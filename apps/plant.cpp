@@ -2,18 +2,22 @@
 //
 // ves plant: everything that was metal, as a process of its own.
 #include "app.hpp"
+#include "commands.hpp"
 
-int main(int argc, char** argv) {
-  using namespace ves;
+namespace ves::app {
+
+int plantCommand(int argc, char** argv) {
   CLI::App cli("The plant as a process: legs, platform, robot, sensor. Runs until Ctrl-C.",
                "ves plant");
-  app::Options options;
+  Options options;
   options.addExperiment(cli);
   options.addBus(cli);
-  return app::run(cli, argc, argv, [&] {
+  return run(cli, argc, argv, [&] {
     if (options.private_bus) enterPrivateBus();
-    app::catchSignals();
-    runPlant(options.load(), options.process, [] { return app::stop_requested != 0; });
-    return app::kDone;
+    catchSignals();
+    runPlant(options.load(), options.process, [] { return stop_requested != 0; });
+    return kDone;
   });
 }
+
+}  // namespace ves::app

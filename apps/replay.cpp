@@ -3,10 +3,12 @@
 // ves replay: a recorded run through the controller once more.
 #include "ves/run/replay.hpp"
 #include "app.hpp"
+#include "commands.hpp"
 #include "ves/base/build.hpp"
 
-int main(int argc, char** argv) {
-  using namespace ves;
+namespace ves::app {
+
+int replayCommand(int argc, char** argv) {
   CLI::App cli(
       "Feeds the recorded samples of a log through the controller and tells what happened. "
       "Needs nothing but the log.",
@@ -18,12 +20,12 @@ int main(int argc, char** argv) {
   cli.add_flag("--check", check,
                "compare every command and state bit for bit; differences: status 1");
   cli.add_option("--speed", options.speed, "times real time; as fast as it goes by default")
-      ->check(app::inRange(1e-3, 1e6));
+      ->check(inRange(1e-3, 1e6));
   cli.add_option("--with", with, "what would the controller have done with this scenario instead?");
-  return app::run(cli, argc, argv, [&] {
+  return run(cli, argc, argv, [&] {
     std::optional<Experiment> other;
     if (!with.empty()) {
-      other = loadExperiment(findScenario(with, app::configFolder()));
+      other = loadExperiment(findScenario(with, configFolder()));
       applyStabilityCheck(*other);
       options.with = &*other;
     }
@@ -57,11 +59,13 @@ int main(int argc, char** argv) {
           other->name, r.pose_difference(0) * 1e3, r.pose_difference(1) * 1e3,
           r.pose_difference(2) * 1e3, r.pose_difference(3) / kDegree,
           r.pose_difference(4) / kDegree, r.pose_difference(5) / kDegree);
-    if (!check) return app::kDone;
+    if (!check) return kDone;
     fmt::print("{} of {} states and commands differ\n", r.different, r.messages);
     if (r.first)
       fmt::print("first in tick {} (byte {}): {} recorded {}, replayed {}\n", r.first->tick,
                  r.first->offset, r.first->field, r.first->recorded, r.first->replayed);
-    return r.different == 0 ? app::kDone : app::kTripped;
+    return r.different == 0 ? kDone : kTripped;
   });
 }
+
+}  // namespace ves::app

@@ -3,12 +3,14 @@
 // ves report: chapter 4 of the report once more, as a page and as numbers.
 #include <unistd.h>
 
+#include "commands.hpp"
 #include "runner.hpp"
 #include "ves/results/summary.hpp"
 #include "ves/validation/chapter4.hpp"
 
-int main(int argc, char** argv) {
-  using namespace ves;
+namespace ves::app {
+
+int reportCommand(int argc, char** argv) {
   CLI::App cli(
       "Runs every scenario of the report's chapter 4 in lockstep and leaves report.html, one page "
       "that "
@@ -16,17 +18,17 @@ int main(int argc, char** argv) {
       "ves report");
   std::string out = "ves-runs/report";
   cli.add_option("--out", out, "folder for the results")->capture_default_str();
-  return app::run(cli, argc, argv, [&] {
+  return run(cli, argc, argv, [&] {
     const std::filesystem::path folder = makeFolder(out);
     const bool terminal = isatty(STDERR_FILENO);
     const std::int64_t start = monotonicNow();
     const Chapter4 chapter =
-        reproduceChapter4(app::configFolder(), folder, [&](const std::string& what, int run) {
+        reproduceChapter4(configFolder(), folder, [&](const std::string& what, int run) {
           fmt::print(stderr, "{}run {:3}  {:<32}{}", terminal ? "\r" : "", run, what,
                      terminal ? "" : "\n");
         });
     if (terminal) fmt::print(stderr, "\r{:40}\r", "");
-    app::writeFile(folder / "report.html", chapter.html);
+    writeFile(folder / "report.html", chapter.html);
     writeSummary(chapter.summary, (folder / "summary.json").string());
     for (const auto& claim : chapter.summary["claims"])
       fmt::print("{:<28} {:<17} {}\n", claim["where"].get<std::string>(),
@@ -34,6 +36,8 @@ int main(int argc, char** argv) {
     fmt::print("\n{:.0f} s; {}\n",
                static_cast<double>(monotonicNow() - start) * kSecondPerNanosecond,
                (folder / "report.html").string());
-    return app::kDone;
+    return kDone;
   });
 }
+
+}  // namespace ves::app

@@ -1,20 +1,24 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // ves run: one scenario, from start to its folder of results.
+#include "commands.hpp"
 #include "runner.hpp"
 
-int main(int argc, char** argv) {
-  using namespace ves;
+namespace ves::app {
+
+int runCommand(int argc, char** argv) {
   CLI::App cli(
       "Runs a scenario: in real time as two processes on the bus, or with --lockstep as fast "
       "as possible. Leaves run.lcmlog, summary.json, series.csv and plots.",
       "ves run");
-  app::RunnerOptions options;
+  RunnerOptions options;
   options.addExperiment(cli);
   options.addForce(cli);
   options.addBus(cli);
   cli.add_option("--out", options.out, "folder for the results; a new one in ves-runs by default");
   cli.add_flag("--two-processes", options.two_processes, "in lockstep too, over the bus");
   cli.add_flag("!--no-plots", options.plots, "leave the plots out");
-  return app::run(cli, argc, argv, [&] { return app::runExperiment(options); });
+  return run(cli, argc, argv, [&] { return runExperiment(options); });
 }
+
+}  // namespace ves::app

@@ -39,7 +39,7 @@ inline LaunchOptions prepareFolder(RunnerOptions& options, const Experiment& exp
                               fmt::localtime(std::time(nullptr)));
   const std::filesystem::path folder = makeFolder(options.out);
   LaunchOptions launch;
-  launch.programs = std::filesystem::read_symlink("/proc/self/exe").parent_path();
+  launch.program = ownProgram();
   launch.scenario = folder / "experiment.yaml";
   writeFile(launch.scenario, experiment.resolved);
   options.process.log = (folder / "run.lcmlog").string();

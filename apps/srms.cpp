@@ -6,15 +6,15 @@
 #include <fstream>
 
 #include "app.hpp"
+#include "commands.hpp"
 #include "ves/base/coordinates.hpp"
 #include "ves/config/base.hpp"
 
+namespace ves::app {
 namespace {
 
-using namespace ves;
-
 int showModes(const std::string& name, const std::vector<std::string>& overrides) {
-  const Base base = loadBase(findBase(name, app::configFolder()), overrides);
+  const Base base = loadBase(findBase(name, configFolder()), overrides);
   const ModalModel& m = base.modes;
   fmt::print("{:>4} {:>10} {:>8} {:>12}  {}\n", "mode", "[Hz]", "zeta", "mass [kg]",
              "shape at the robot's foot, in P: x y z [m], alpha beta gamma [rad]");
@@ -28,19 +28,19 @@ int showModes(const std::string& name, const std::vector<std::string>& overrides
     fmt::print("\n");
   }
   fmt::print("mass: of a point at the foot with the same momentum; shapes are mass-normalised\n");
-  if (!base.arm) return app::kDone;
+  if (!base.arm) return kDone;
   const Mat6 C = tipCompliance(*base.arm);
   fmt::print("\n{} degrees of freedom; stiffness at the foot, other directions free:\n ",
              base.arm->frame.dofs());
   for (int i = 0; i < 6; ++i)
     fmt::print(" {} {:.0f} {}{}", coordinate(i).name, 1.0 / C(i, i), i < 3 ? "N/m" : "N m/rad",
                i < 5 ? "," : "\n");
-  return app::kDone;
+  return kDone;
 }
 
 /// The straight arm beside what has been published of it.
 int showPublished() {
-  const PublishedArm published = loadPublished(app::configFolder() / "arms" / "straight_arm.yaml");
+  const PublishedArm published = loadPublished(configFolder() / "arms" / "straight_arm.yaml");
   fmt::print("straight arm without mass, natural frequencies with a payload [Hz]\n");
   for (const PublishedFrequencies& row : published.rows) {
     const Vec6 ours = masslessFrequencies(published.arm, row.payload_P);
@@ -54,7 +54,7 @@ int showPublished() {
     line("this model", "{:>9.4f}", ours);
     line("difference", "{:>+8.1f}%", 100.0 * (ours.cwiseQuotient(row.frequency) - Vec6::Ones()));
   }
-  return app::kDone;
+  return kDone;
 }
 
 struct Range {
@@ -69,8 +69,8 @@ struct Range {
 /// Both models of chapter 3, and how far the report's split is from the whole.
 int simulateBoth(const std::string& scenario, const std::vector<std::string>& overrides,
                  InteractionOptions options, const std::string& file) {
-  const Experiment e = loadExperiment(findScenario(scenario, app::configFolder()), overrides);
-  app::printWarnings(e);
+  const Experiment e = loadExperiment(findScenario(scenario, configFolder()), overrides);
+  printWarnings(e);
   const Interaction interaction = interactionOf(e, options.duration);
   // The integrator is explicit: it follows every vibration, kept or not by damping.
   constexpr double kFastest = 1000.0;  // [Hz]
@@ -119,13 +119,12 @@ int simulateBoth(const std::string& scenario, const std::vector<std::string>& ov
     to.flush();
     if (!to) throw InputError(fmt::format("--out {}: cannot be written", file));
   }
-  return app::kDone;
+  return kDone;
 }
 
 }  // namespace
 
-int main(int argc, char** argv) {
-  using namespace ves;
+int srmsCommand(int argc, char** argv) {
   CLI::App cli("The flexible base and the robot on it, without platform.", "ves srms");
   cli.require_subcommand(1);
   std::string name;
@@ -145,7 +144,7 @@ int main(int argc, char** argv) {
   simulation->add_option("--set", overrides, "KEY.PATH=VALUE as if it stood in the file")
       ->allow_extra_args(false);
   simulation->add_option("--tolerance", options.tolerance, "of the integrator, relative")
-      ->check(app::inRange(1e-13, 1e-2))
+      ->check(inRange(1e-13, 1e-2))
       ->capture_default_str();
   simulation
       ->add_option("--hold-mass", options.hold_mass,
@@ -154,9 +153,11 @@ int main(int argc, char** argv) {
   simulation->add_option("--out", out, "file for the motion, CSV");
   CLI::App* published =
       cli.add_subcommand("published", "the straight arm beside published frequencies");
-  return app::run(cli, argc, argv, [&] {
+  return run(cli, argc, argv, [&] {
     if (simulation->parsed()) return simulateBoth(name, overrides, options, out);
     if (published->parsed()) return showPublished();
     return showModes(name, overrides);
   });
 }
+
+}  // namespace ves::app

@@ -5,25 +5,27 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "commands.hpp"
 #include "runner.hpp"
 #include "ves/analysis/appendix_e.hpp"
 #include "ves/analysis/gate.hpp"
 #include "ves/results/gnuplot.hpp"
 
+namespace ves::app {
 namespace {
-
-using namespace ves;
 
 /// The loop with the softest 1, 2, .. modes kept, the verdict on all of them, and its margins.
 int showLoop(const Experiment& e) {
   const JointVector& q = e.plant.initial_joints;
   const Loop loop = loopOf(e.controller, e.plant, q, Direction::kExtending);
-  fmt::print("{:>5} {:>10} {:>16}   {:>28}   {:>28}\n", "modes", "[Hz]", "mass ratio (E.20)",
-             "legs extending: growth [1/s]", "retracting: growth [1/s]");
+  fmt::print("{:>5} {:>10} {:>16}   {:>28}   {:>28}   {:>28}\n", "modes", "[Hz]",
+             "mass ratio (E.20)", "legs extending: growth [1/s]", "retracting: growth [1/s]",
+             "swinging: growth [1/s]");
   for (int k = 1; k <= loop.base.stiffness.size(); ++k) {
     fmt::print("{:>5} {:>10.4f} {:>17.3f}", k, std::sqrt(loop.base.stiffness(k - 1)) / (2.0 * M_PI),
                massRatios(softest(loop.base, k), loop.robot_P)(0));
-    for (const Direction direction : {Direction::kExtending, Direction::kRetracting}) {
+    for (const Direction direction :
+         {Direction::kExtending, Direction::kRetracting, Direction::kSwinging}) {
       Loop some = loopOf(e.controller, e.plant, q, direction);
       some.base = softest(some.base, k);
       const DominantRoot s = dominantRoot(some);
@@ -35,7 +37,7 @@ int showLoop(const Experiment& e) {
   const LoopVerdict v = assessStability(e.controller, e.plant);
   if (!v.stable) {
     fmt::print("{}\n", explain(v));
-    return app::kTripped;
+    return kTripped;
   }
   for (const Direction direction : {Direction::kExtending, Direction::kRetracting}) {
     const bool extending = direction == Direction::kExtending;
@@ -47,7 +49,7 @@ int showLoop(const Experiment& e) {
         extending ? "extending" : "retracting", least(m.gain >= Margins::kMostGain), m.gain,
         least(m.delay == Margins::kMostDelay), m.delay);
   }
-  return app::kDone;
+  return kDone;
 }
 
 /// A parameter of the loop that a map can run over.
@@ -157,7 +159,7 @@ int drawMap(const Experiment& e, const MapAxis& x, const MapAxis& y,
     if (shown) fmt::print(stderr, "\r{:3.0f} %", 100.0 * (j + 1) / kPoints);
   }
   if (shown) fmt::print(stderr, "\r     \r");
-  app::writeFile(folder / "map.csv", csv);
+  writeFile(folder / "map.csv", csv);
   draw(fmt::format(
            "$map << EOD\n{}EOD\n{}set output 'map.png'\nset title {}\nset xlabel {}\n"
            "set ylabel {}\nset cblabel 'growth [1/s]'\n"
@@ -172,7 +174,7 @@ int drawMap(const Experiment& e, const MapAxis& x, const MapAxis& y,
                ": blue decays, red diverges, line: the limit. Legs extending, robot as it stands"),
            quoted(x.parameter->label), quoted(y.parameter->label), x.from, x.to, y.from, y.to),
        folder, "map.png");
-  return app::kDone;
+  return kDone;
 }
 
 /// Figure E.4, its polynomial beside the exact transition, and the limit line.
@@ -193,7 +195,7 @@ int drawPublished(const std::filesystem::path& folder) {
     }
     data += "\n";
   }
-  app::writeFile(folder / "figure_e4.csv", csv);
+  writeFile(folder / "figure_e4.csv", csv);
   std::string script =
       "$e4 << EOD\n" + data + "EOD\n" + kLook +
       "set output 'figure_e4.png'\nset multiplot layout 1,2 margins 0.07,0.92,0.13,0.92 "
@@ -210,16 +212,16 @@ int drawPublished(const std::filesystem::path& folder) {
         quoted(title), column == 3 ? "0.7:1.3" : "0:2", column, column);
   draw(script + "unset multiplot\n", folder, "figure_e4.png");
   fmt::print("the roots of (E.11) are the eigenvalues of the exact transition to {:.0e}\n", apart);
-  return app::kDone;
+  return kDone;
 }
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int stabilityCommand(int argc, char** argv) {
   CLI::App cli("Stability of the force feedback: Appendix E, and the loop of this machine.",
                "ves stability");
   cli.require_subcommand(1);
-  app::Options options;
+  Options options;
   CLI::App* loop = cli.add_subcommand(
       "loop", "a scenario's roots, verdict and margins; status 1 when it would diverge");
   options.addExperiment(*loop);
@@ -236,10 +238,10 @@ int main(int argc, char** argv) {
   map->add_option("--set", options.overrides, "KEY.PATH=VALUE as if it stood in the scenario")
       ->allow_extra_args(false);
   map->add_option("--out", out, "folder for the results")->capture_default_str();
-  return app::run(cli, argc, argv, [&] {
+  return run(cli, argc, argv, [&] {
     if (loop->parsed()) {
       const Experiment e = options.load();
-      app::printWarnings(e);
+      printWarnings(e);
       return showLoop(e);
     }
     if (scenario.empty()) {
@@ -254,3 +256,5 @@ int main(int argc, char** argv) {
     return drawMap(options.load(), of_x, of_y, makeFolder(out));
   });
 }
+
+}  // namespace ves::app

@@ -5,9 +5,11 @@
 
 #include <thread>
 
+#include "commands.hpp"
 #include "runner.hpp"
 #include "ves/sweep/sweep.hpp"
 
+namespace ves::app {
 namespace {
 
 /// Our place among the processes that mpirun (or srun) has started; {0, 1} without.
@@ -33,8 +35,7 @@ std::string duration(double seconds) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
-  using namespace ves;
+int sweepCommand(int argc, char** argv) {
   CLI::App cli(
       "A scenario in lockstep over every combination of the varied values, or random draws, on all "
       "cores: one row a run in sweep.csv. The same rows whatever the number of workers; the same "
@@ -62,7 +63,7 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
   cli.add_option("--out", out, "folder; ves-runs/sweep-SCENARIO by default");
-  return app::run(cli, argc, argv, [&, rank = rank, ranks = ranks] {
+  return run(cli, argc, argv, [&, rank = rank, ranks = ranks] {
     SweepPlan plan;
     for (const std::string& option : vary) plan.vary(option);
     for (const std::string& option : draw) plan.draw(option);
@@ -70,7 +71,7 @@ int main(int argc, char** argv) {
     plan.seed(seed);
     if (plan.size() == 1) throw InputError("one run only: want --vary or --runs");
     SweepOptions options;
-    options.scenario = findScenario(scenario, app::configFolder());
+    options.scenario = findScenario(scenario, configFolder());
     options.overrides = sets;
     options.workers = workers;
     options.rank = rank;
@@ -83,7 +84,7 @@ int main(int argc, char** argv) {
       if (out.empty()) out = "ves-runs/sweep-" + e.name;
     }
     options.file = makeFolder(out) / "sweep.csv";
-    app::catchSignals();
+    catchSignals();
     const bool terminal = isatty(STDERR_FILENO) != 0;
     const SweepResult result = sweep(
         plan, options,
@@ -93,17 +94,19 @@ int main(int argc, char** argv) {
           fmt::print(stderr, "\r{} of {}, {:.1f} a second, {} left        ", p.done, p.of, rate,
                      duration(static_cast<double>(p.of - p.done) / rate));
         },
-        [] { return app::stop_requested != 0; });
+        [] { return stop_requested != 0; });
     if (terminal) fmt::print(stderr, "\r{:60}\r", "");
     if (!result.complete) {
-      const bool others = ranks > 1 && !app::stop_requested;
+      const bool others = ranks > 1 && !stop_requested;
       fmt::print("{} of {} runs so far; {}\n", result.rows, plan.size(),
                  others ? fmt::format("the last of the {} processes puts them together", ranks)
                         : "the same command goes on");
-      return others ? app::kDone : app::kTripped;
+      return others ? kDone : kTripped;
     }
     fmt::print("{} runs, {} of them not to their end\n{}\n", result.rows, result.not_good,
                options.file.string());
-    return app::kDone;
+    return kDone;
   });
 }
+
+}  // namespace ves::app

@@ -135,7 +135,7 @@ TEST_F(ClosedLoop, GravityCompensationLeavesQuantisationAndFilterLag) {
   in.order.request = Request::kStart;
   double still = 0.0, moving = 0.0, allowed = 0.0;
   std::int64_t still_since = 0;
-  for (; !platform.done(); ++in.tick) {
+  for (bool done = false; !done; ++in.tick) {
     Vec3 inertial = Vec3::Zero();
     for (int k = 1; k <= 20; ++k) {
       in.sample = plant.sample();
@@ -144,6 +144,7 @@ TEST_F(ClosedLoop, GravityCompensationLeavesQuantisationAndFilterLag) {
       if (plant.time() > 0) inertial = filter.step(R_PI * (truth.F_Po_I.f - weight_I), 0.5e-3);
       if (k == 1) {
         const TickState& state = platform.tick(in);
+        done = test::done(state);
         plant.command(state.command);
         if (state.motion.x_dot.norm() > 0.0) still_since = in.tick;
         if (state.phase == Phase::kRunning && state.segment >= 2) {

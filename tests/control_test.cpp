@@ -233,6 +233,47 @@ TEST(AdmittanceModel, KeepsWhatFewModesCannotExpress) {
   }
 }
 
+TEST(AdmittanceModel, IsWhereItIsResetBeforeItsFirstStep) {
+  const ControllerConfig c = experiment("puma_on_table_4_1").controller;
+  const Vec6 x = Vec6::LinSpaced(-0.03, 0.02);
+  for (const double ahead : {0.0, 0.02}) {
+    AdmittanceModel model(c.admittance, kT, ahead);
+    model.step(Wrench::from(Vec6::Constant(10.0)));
+    model.reset(x);
+    EXPECT_EQ(model.motion().x, x);
+    EXPECT_EQ(model.motion().x_dot, Vec6::Zero());
+  }
+}
+
+TEST(AdmittanceModel, LooksAheadOnlyWhenAskedTo) {
+  const ControllerConfig c = experiment("puma_on_table_4_1").controller;
+  AdmittanceModel plain(c.admittance, kT), ahead(c.admittance, kT, 0.02);
+  const Wrench F = Wrench::from(Vec6::LinSpaced(5.0, -20.0));
+  plain.reset(Vec6::Zero());
+  ahead.reset(Vec6::Zero());
+  for (int n = 0; n < 50; ++n) {
+    plain.step(F);
+    ahead.step(F);
+    ASSERT_EQ(plain.motion().x, ahead.motion().x);
+  }
+}
+
+TEST(AdmittanceModel, ASlowedStepGoesThatShareOfTheWay) {
+  const ControllerConfig c = experiment("puma_on_table_4_1").controller;
+  AdmittanceModel model(c.admittance, kT);
+  model.reset(Vec6::LinSpaced(-0.02, 0.03));
+  for (int n = 0; n < 40; ++n) model.step(Wrench::from(Vec6::LinSpaced(30.0, -20.0)));
+  const PathPoint<6> before = model.motion();
+  model.step({});
+  const PathPoint<6> after = model.motion();
+  const double share = 0.3;
+  model.slow(share);
+  const PathPoint<6>& slowed = model.motion();
+  EXPECT_LT((slowed.x - before.x - share * (after.x - before.x)).norm(), 1e-14);
+  EXPECT_LT((slowed.x_dot - share * after.x_dot).norm(), 1e-13);
+  EXPECT_LT((slowed.x_ddot - (slowed.x_dot - before.x_dot) / kT).norm(), 1e-11);
+}
+
 TEST(Modes, AreMassNormalised) {
   const Mat6 M = randomDefinite(1, 50), K = randomDefinite(2, 400);
   const ModalModel modes = modesOf(M, Mat6::Zero(), K);
@@ -291,369 +332,6 @@ TEST(LegCommunication, RoundTripsWithinHalfACount) {
     for (int i = 0; i < 6; ++i) L(i) = u(random);
     ASSERT_LE((legLengths(codec, legCounts(codec, L)) - L).cwiseAbs().maxCoeff(),
               0.5 * 0.0254 / 363.6 * (1 + 1e-9));
-  }
-}
-
-// --- Safety checks: just inside holds, just past trips, NaN trips --------------------------------
-
-class SafetyChecks : public testing::Test {
- protected:
-  const Experiment e_ = experiment("z_sine");
-  const SafetyLimits& l_ = e_.controller.safety;
-  const Geometry& g_ = e_.controller.geometry;
-  const Vec6 L_ = legLengths(g_, g_.fromHome({}));
-};
-
-TEST_F(SafetyChecks, Velocity) {
-  for (int i = 0; i < 6; ++i) {
-    for (double sign : {-1.0, 1.0}) {
-      EXPECT_TRUE(
-          velocityCheck(l_, L_ + sign * 0.999 * l_.leg_velocity * kT * Vec6::Unit(i), L_, kT));
-      EXPECT_FALSE(
-          velocityCheck(l_, L_ + sign * 1.001 * l_.leg_velocity * kT * Vec6::Unit(i), L_, kT));
-    }
-    EXPECT_FALSE(velocityCheck(l_, L_ + kNan * Vec6::Unit(i), L_, kT));
-  }
-}
-
-TEST_F(SafetyChecks, PositionError) {  // scaled with speed
-  for (int i = 0; i < 6; ++i) {
-    for (double speed : {0.0, 0.1, 0.4, 0.7, 5.0}) {
-      const Vec6 v = speed * Vec6::Unit(i);
-      const double allowed = std::min(0.10, 0.010 + 0.12 * speed);  // config/ves.yaml
-      EXPECT_TRUE(positionErrorCheck(l_, L_, L_ + 0.999 * allowed * Vec6::Unit(i), v));
-      EXPECT_FALSE(positionErrorCheck(l_, L_, L_ - 1.001 * allowed * Vec6::Unit(i), v));
-      const int other = (i + 1) % 6;  // a leg's speed excuses no other leg
-      EXPECT_FALSE(positionErrorCheck(l_, L_, L_ + 0.0101 * Vec6::Unit(other), v));
-    }
-    EXPECT_FALSE(positionErrorCheck(l_, L_, L_ + kNan * Vec6::Unit(i), Vec6::Zero()));
-    EXPECT_FALSE(positionErrorCheck(l_, L_, L_ + 0.01 * Vec6::Unit(i), kNan * Vec6::Ones()));
-  }
-}
-
-TEST_F(SafetyChecks, MotionLimits) {
-  for (int i = 0; i < 6; ++i) {
-    const double limit = i < 3 ? 0.305 : 30 * kDegree;
-    for (double sign : {-1.0, 1.0}) {
-      EXPECT_TRUE(motionLimitsCheck(l_, Pose::from(sign * 0.999 * limit * Vec6::Unit(i))));
-      EXPECT_FALSE(motionLimitsCheck(l_, Pose::from(sign * 1.001 * limit * Vec6::Unit(i))));
-    }
-    EXPECT_FALSE(motionLimitsCheck(l_, Pose::from(kNan * Vec6::Unit(i))));
-  }
-}
-
-TEST_F(SafetyChecks, ActuatorLimits) {
-  for (int i = 0; i < 6; ++i) {
-    Vec6 L = L_;
-    L(i) = l_.leg_max - 1e-6;
-    EXPECT_TRUE(actuatorLimitsCheck(l_, L));
-    for (double bad : {l_.leg_max + 1e-6, l_.leg_min - 1e-6, kNan}) {
-      L(i) = bad;
-      EXPECT_FALSE(actuatorLimitsCheck(l_, L)) << bad;
-    }
-  }
-}
-
-TEST_F(SafetyChecks, FlowLimits) {
-  const double extend = l_.flow / l_.bore_area * kT, retract = l_.flow / l_.rod_side_area * kT;
-  for (int i = 0; i < 6; ++i) {
-    EXPECT_TRUE(flowLimitsCheck(l_, L_ + 0.999 * extend * Vec6::Unit(i), L_, kT));
-    EXPECT_FALSE(flowLimitsCheck(l_, L_ + 1.001 * extend * Vec6::Unit(i), L_, kT));
-    EXPECT_TRUE(flowLimitsCheck(l_, L_ - 0.999 * retract * Vec6::Unit(i), L_, kT));
-    EXPECT_FALSE(flowLimitsCheck(l_, L_ - 1.001 * retract * Vec6::Unit(i), L_, kT));
-    EXPECT_FALSE(flowLimitsCheck(l_, L_ + kNan * Vec6::Unit(i), L_, kT));
-  }
-}
-
-TEST_F(SafetyChecks, JointLimits) {
-  const JointAxes axes(g_);
-  SafetyLimits limits = l_;
-  // A pure tilt turns the platform's joints by the tilt, and the legs a little.
-  const Transform tilted = g_.fromHome({Vec3::Zero(), {20 * kDegree, 0.0, 0.0}});
-  limits.joint_cone = 30 * kDegree;
-  EXPECT_TRUE(axes.check(limits, g_, tilted));
-  limits.joint_cone = 15 * kDegree;
-  EXPECT_FALSE(axes.check(limits, g_, tilted));
-  // A pure shift turns both ends alike: the angle of the most turned leg, by its cosine.
-  const Transform shifted = g_.fromHome({{0.2, 0.0, 0.0}, Vec3::Zero()});
-  double most = 0.0;
-  for (std::size_t i = 0; i < kLegs; ++i) {
-    const Vec3 a = g_.fromHome({}) * g_.p_PPi_P[i] - g_.p_IBi_I[i], b = a + Vec3(0.2, 0.0, 0.0);
-    most = std::max(most, std::acos(a.dot(b) / a.norm() / b.norm()));
-  }
-  limits.joint_cone = most * 1.001;
-  EXPECT_TRUE(axes.check(limits, g_, shifted));
-  limits.joint_cone = most * 0.999;
-  EXPECT_FALSE(axes.check(limits, g_, shifted));
-  EXPECT_FALSE(axes.check(l_, g_, {Mat3::Identity(), {kNan, 0.0, 1.35}}));
-}
-
-TEST_F(SafetyChecks, SegmentDistanceIsTheSmallestOfManyPoints) {
-  std::mt19937 random(11);
-  std::uniform_real_distribution<double> u(-1.0, 1.0);
-  const auto point = [&] { return Vec3(u(random), u(random), u(random)); };
-  for (int k = 0; k < 300; ++k) {
-    const Vec3 a = point(), b = point(), c = point(), d = k % 5 ? point() : Vec3(c + 0.7 * (b - a));
-    double least = 1e9;
-    constexpr int kGrid = 200;
-    for (int i = 0; i <= kGrid; ++i)
-      for (int j = 0; j <= kGrid; ++j)
-        least = std::min(least, (a + (b - a) * i / kGrid - c - (d - c) * j / kGrid).norm());
-    const double distance = segmentDistance(a, b, c, d);
-    ASSERT_LE(distance, least + 1e-12);
-    ASSERT_GE(distance, least - 0.02);  // of the grid
-  }
-}
-
-TEST_F(SafetyChecks, Collide) {
-  const Transform home = g_.fromHome({});
-  SafetyLimits limits = l_;
-  double least = 1e9;
-  for (std::size_t i = 0; i < kLegs; ++i)
-    for (std::size_t j = i + 1; j < kLegs; ++j)
-      least = std::min(least, segmentDistance(g_.p_IBi_I[i], home * g_.p_PPi_P[i], g_.p_IBi_I[j],
-                                              home * g_.p_PPi_P[j]));
-  limits.leg_clearance = least * 0.999;
-  EXPECT_TRUE(collideCheck(limits, g_, home));
-  limits.leg_clearance = least * 1.001;
-  EXPECT_FALSE(collideCheck(limits, g_, home));
-  EXPECT_FALSE(collideCheck(l_, g_, {Mat3::Identity(), {kNan, 0.0, 1.35}}));
-}
-
-TEST_F(SafetyChecks, TheWorkspaceItselfIsFreeOfTrips) {  // every coordinate alone, to its ends
-  const JointAxes axes(g_);
-  for (int i = 0; i < 6; ++i)
-    for (double share = -0.99; share < 1.0; share += 0.09) {
-      const Pose x = Pose::from(share * (i < 3 ? 0.305 : 30 * kDegree) * Vec6::Unit(i));
-      const Transform X = g_.fromHome(x);
-      EXPECT_TRUE(actuatorLimitsCheck(l_, legLengths(g_, X))) << x.stacked().transpose();
-      EXPECT_TRUE(collideCheck(l_, g_, X)) << x.stacked().transpose();
-      EXPECT_TRUE(axes.check(l_, g_, X)) << x.stacked().transpose();
-    }
-}
-
-TEST(TrippedSet, FirstIsTheHighestPriority) {
-  Tripped t;
-  EXPECT_EQ(t.first(), Check::kCount);
-  t.require(Check::kFlow, false);
-  t.require(Check::kCollide, false);
-  t.require(Check::kPanicButton, true);
-  EXPECT_EQ(t.first(), Check::kCollide);
-  EXPECT_TRUE(t.has(Check::kFlow));
-  EXPECT_FALSE(t.has(Check::kPanicButton));
-}
-
-// --- testPlatform --------------------------------------------------------------------------------
-
-/// A controller on a machine that goes exactly where it is told, at once.
-class Bench {
- public:
-  explicit Bench(const std::string& scenario, const std::vector<std::string>& set = {},
-                 const Pose& found = {{0.01, -0.02, -0.05}, {0.02, 0.0, 0.01}})
-      : e_(experiment(scenario, set)), platform_(e_.controller) {
-    const Geometry& g = e_.controller.geometry;
-    in_.sample.legs = legCounts(e_.controller.legs, legLengths(g, g.fromHome(found)));
-    in_.sample.q = e_.plant.initial_joints;
-    in_.sample.switches = kAllSwitchesClosed;
-    in_.sample.adc[6] = (e_.controller.safety.pressure_min + e_.controller.safety.pressure_max) / 2;
-    in_.order.request = Request::kStart;
-  }
-  const TickState& tick() {
-    ++in_.sample.sequence;
-    in_.sample.adc[0] ^= 1;  // alive
-    const TickState& state = platform_.tick(in_);
-    ++in_.tick;
-    in_.order.request = Request::kNone;
-    if (state.command.engaged) in_.sample.legs = state.command.counts;
-    return state;
-  }
-  const TickState& tickUntil(Phase phase) {
-    const TickState* state = &tick();
-    for (int i = 0; i < 5000 && state->phase != phase; ++i) state = &tick();
-    return *state;
-  }
-  TickInput& in() { return in_; }
-  const Experiment& experimentUsed() const { return e_; }
-
- private:
-  Experiment e_;
-  TestPlatform platform_;
-  TickInput in_;
-};
-
-TEST(TestPlatform, FirstCommandIsTheMeasuredPose) {
-  Bench bench("z_sine");
-  const LegCounts found = bench.in().sample.legs;
-  for (int i = 0; i < 100; ++i) {
-    const TickState& state = bench.tick();
-    if (!state.command.engaged) continue;
-    EXPECT_EQ(state.phase, Phase::kArmed);
-    for (std::size_t k = 0; k < kLegs; ++k)
-      EXPECT_LE(std::abs(state.command.counts[k] - found[k]), 1);
-    return;
-  }
-  FAIL() << "never armed";
-}
-
-TEST(TestPlatform, ArmsOnlyAfterAFreshStream) {
-  Bench bench("z_sine");
-  for (int i = 0; i < 50; ++i) {
-    if (i % 5 == 0) --bench.in().sample.sequence;  // every fifth sample is the one before
-    EXPECT_EQ(bench.tick().phase, Phase::kDisarmed);
-  }
-  for (int i = 0; i < 11; ++i) bench.tick();
-  EXPECT_EQ(bench.tick().phase, Phase::kRunning);
-}
-
-TEST(TestPlatform, RefusesToArmBesideAnotherController) {
-  Bench bench("z_sine");
-  for (int i = 0; i < 50; ++i) {
-    bench.in().conflicting_node = i % 2 == 0;
-    bench.tick();
-  }
-  bench.in().conflicting_node = true;
-  const TickState& state = bench.tick();
-  EXPECT_EQ(state.phase, Phase::kDisarmed);
-  EXPECT_TRUE(state.tripped.has(Check::kConflictingNode));
-}
-
-TEST(TestPlatform, ComesHomeGentlyAndParks) {
-  Bench bench("ramp");
-  const TickState& state = bench.tickUntil(Phase::kParked);
-  EXPECT_EQ(state.phase, Phase::kParked);
-  EXPECT_EQ(state.motion.x.norm(), 0.0);
-  EXPECT_EQ(state.motion.x_dot.norm(), 0.0);
-}
-
-TEST(TestPlatform, StopRequestComesHomeWithoutAJump) {
-  Bench bench("z_sine");
-  while (bench.tick().segment < 1) {
-  }
-  for (int i = 0; i < 180; ++i) bench.tick();  // in full swing
-  const double rate = bench.tick().motion.x_dot(2);
-  EXPECT_GT(std::abs(rate), 0.2);
-  bench.in().order.request = Request::kStop;
-  const Vec6 before = bench.tick().motion.x_dot;
-  EXPECT_NEAR(before(2), rate, 0.05);
-  EXPECT_EQ(bench.tickUntil(Phase::kParked).phase, Phase::kParked);
-}
-
-struct Fault {
-  const char* name;
-  Check check;
-  void (*inject)(TickInput&);
-};
-std::ostream& operator<<(std::ostream& out, const Fault& fault) { return out << fault.name; }
-
-class Trips : public testing::TestWithParam<Fault> {};
-
-TEST_P(Trips, LatchesAndHoldsTheLastCheckedLengths) {
-  Bench bench("puma_tilt");
-  bench.tickUntil(Phase::kRunning);
-  for (int i = 0; i < 400; ++i) bench.tick();
-  const LegCounts last = bench.tick().command.counts;
-  GetParam().inject(bench.in());
-  const TickState& state = bench.tick();
-  EXPECT_EQ(state.phase, Phase::kStopped);
-  EXPECT_EQ(state.cause, GetParam().check);
-  EXPECT_EQ(state.cause_tick, state.tick);
-  EXPECT_EQ(state.command.counts, last);
-  EXPECT_TRUE(state.command.engaged);
-  // The cause goes away; the stop stays.
-  bench.in().sample.switches = kAllSwitchesClosed;
-  bench.in().sample.q = bench.experimentUsed().plant.initial_joints;
-  bench.in().conflicting_node = false;
-  for (int i = 0; i < 100; ++i) {
-    bench.in().sample.legs = last;
-    EXPECT_EQ(bench.tick().command.counts, last);
-  }
-  EXPECT_EQ(bench.tick().phase, Phase::kStopped);
-  EXPECT_EQ(bench.tick().cause, GetParam().check);
-}
-
-INSTANTIATE_TEST_SUITE_P(
-    Faults, Trips,
-    testing::Values(
-        Fault{"panic_button", Check::kPanicButton,
-              [](TickInput& in) { in.sample.switches &= ~kPanicButtonClosed; }},
-        Fault{"floor_mat", Check::kFloorMat,
-              [](TickInput& in) { in.sample.switches &= ~kFloorMatClosed; }},
-        Fault{"joint_angle_nan", Check::kFinite, [](TickInput& in) { in.sample.q(2) = kNan; }},
-        Fault{"joint_angle_infinite", Check::kFinite,
-              [](TickInput& in) { in.sample.q(0) = std::numeric_limits<double>::infinity(); }},
-        Fault{"second_controller", Check::kConflictingNode,
-              [](TickInput& in) { in.conflicting_node = true; }}),
-    [](const auto& test) { return std::string(test.param.name); });
-
-struct Crossing {
-  const char* name;
-  Check check;
-  const char* scenario;
-  const char* limit;  // that the program crosses, and no other
-  const char* program = nullptr;
-};
-std::ostream& operator<<(std::ostream& out, const Crossing& crossing) {
-  return out << crossing.name;
-}
-
-class Limits : public testing::TestWithParam<Crossing> {};
-
-TEST_P(Limits, StopTheProgramThatCrossesThem) {
-  const Crossing& c = GetParam();
-  std::vector<std::string> set = {c.limit};
-  if (c.program) set.push_back(c.program);
-  Bench bench(c.scenario, set, Pose{});
-  LegCounts last{};
-  const TickState* state = nullptr;
-  for (int i = 0; i < 3000; ++i) {
-    state = &bench.tick();
-    if (state->phase == Phase::kStopped || state->phase == Phase::kParked) break;
-    last = state->command.counts;
-  }
-  ASSERT_EQ(state->phase, Phase::kStopped);
-  EXPECT_EQ(state->cause, c.check) << name(state->cause);
-  EXPECT_EQ(state->tripped.bits(), 1u << static_cast<unsigned>(c.check));  // it alone
-  EXPECT_EQ(state->command.counts, last);
-}
-
-INSTANTIATE_TEST_SUITE_P(
-    Checks, Limits,
-    testing::Values(
-        Crossing{"motion", Check::kMotionLimits, "z_sine", "safety.translation_m=0.1"},
-        Crossing{"actuator_long", Check::kActuatorLimits, "z_sine", "safety.leg_max_m=1.6"},
-        Crossing{"actuator_short", Check::kActuatorLimits, "z_sine", "safety.leg_min_m=1.45"},
-        Crossing{"joint", Check::kJointLimits, "alpha_sine", "safety.joint_cone_deg=10"},
-        // Legs hardly approach each other in one coordinate: 0.1529 m at 30 degrees, 0.1531 m at
-        // home.
-        Crossing{"collide", Check::kCollide, "alpha_sine", "safety.leg_clearance_m=0.1530",
-                 "program=[{trajectory: {duration_s: 4, alpha: {ramp: {to_deg: 29.9}}}}]"},
-        Crossing{"velocity", Check::kVelocity, "z_sine", "safety.leg_velocity_m_per_s=0.3"},
-        Crossing{"flow", Check::kFlow, "z_sine", "safety.flow_l_per_s=0.3"}),
-    [](const auto& test) { return std::string(test.param.name); });
-
-TEST(TestPlatform, SilenceTripsAfterTheAllowedAge) {
-  Bench bench("puma_tilt");
-  bench.tickUntil(Phase::kRunning);
-  const int allowed = bench.experimentUsed().controller.safety.stale_ticks;
-  for (int i = 1; i <= allowed; ++i) {
-    --bench.in().sample.sequence;
-    EXPECT_EQ(bench.tick().phase, Phase::kRunning) << i;
-  }
-  --bench.in().sample.sequence;
-  const TickState& state = bench.tick();
-  EXPECT_EQ(state.cause, Check::kStale);
-  EXPECT_EQ(bench.tickUntil(Phase::kStopped).phase, Phase::kStopped);
-}
-
-TEST(TestPlatform, NoJointAngleEverReachesACommandAsNan) {
-  Bench bench("puma_on_table_4_1");
-  bench.tickUntil(Phase::kRunning);
-  for (int i = 0; i < 600; ++i) bench.tick();  // into admittance control
-  bench.in().sample.q.setConstant(kNan);
-  for (int i = 0; i < 50; ++i) {
-    const TickState& state = bench.tick();
-    ASSERT_TRUE(state.motion.x.allFinite());
-    ASSERT_TRUE(state.legs.L.allFinite());
   }
 }
 

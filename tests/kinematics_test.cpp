@@ -106,6 +106,15 @@ TEST(ForwardMotion, RefusesASingularPlatform) {
   EXPECT_FALSE(forwardMotion(g, home, {legLengths(g, home), Vec6::Zero(), Vec6::Zero()}, P));
 }
 
+TEST(ForwardPose, SaysThatAPlatformIsSingular) {  // similar hexagons turn without lengthening a leg
+  Geometry g = geometry();
+  for (std::size_t i = 0; i < kLegs; ++i) g.p_PPi_P[i] = 0.55 * g.p_IBi_I[i];
+  const Transform home = g.fromHome({});
+  const Vec6 longer = legLengths(g, home) + 1e-3 * Vec6::LinSpaced(-1.0, 2.0);
+  EXPECT_EQ(forwardPose(g, longer, home).status, SolveStatus::kSingular);
+  EXPECT_EQ(conditionNumber(g, home), HUGE_VAL);
+}
+
 TEST(BodyMotionOfCoordinates, MatchesFiniteDifferences) {  // (2.27), (2.33)
   const double h = 1e-5;
   const test::Swing swing(5);

@@ -102,6 +102,25 @@ INSTANTIATE_TEST_SUITE_P(
                     Mode{"step_of_one", 1.0, 0.1, 1.0}, Mode{"edge_series", 1.0001, 1.9, 1.0}),
     [](const auto& test) { return test.param.name; });
 
+TEST(Discretise, NearCriticalDampingIsExactFromEitherSide) {
+  // cos and sin/q continued to q^2 <= 0, in long double, where neither cancels.
+  const double a = 10.0, T = 0.01;
+  for (const double x : {-0.02, -0.0101, -0.0099, -4e-3, -1e-3, -1e-5, -1e-8, 0.0, 1e-8, 1e-5,
+                         0.99e-4, 1.01e-4, 1.2e-4, 1e-3, 1e-2}) {  // (qT)^2
+    const double k = x / (T * T) + a * a, c = 2.0 * a;
+    const long double q2 = static_cast<long double>(k) - static_cast<long double>(a) * a;
+    const long double q = std::sqrt(std::abs(q2)),
+                      decay = std::exp(-static_cast<long double>(a) * T);
+    const long double cosine = decay * (q2 < 0 ? std::cosh(q * T) : std::cos(q * T));
+    const long double sine =
+        q == 0 ? decay * T : decay * (q2 < 0 ? std::sinh(q * T) : std::sin(q * T)) / q;
+    const SecondOrderHold hold = discretise(k, c, T);
+    EXPECT_NEAR(hold.Phi(0, 1), static_cast<double>(sine), 3e-15 * T) << x;
+    EXPECT_NEAR(hold.Phi(1, 1), static_cast<double>(cosine - a * sine), 3e-15) << x;
+    EXPECT_NEAR(hold.Phi(0, 0), static_cast<double>(cosine + a * sine), 3e-15) << x;
+  }
+}
+
 /// State space of a Butterworth filter, driven by a straight line: exp on the state beside the
 /// line.
 template <int Order>

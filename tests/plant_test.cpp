@@ -18,154 +18,6 @@ namespace {
 constexpr double kUpdate = 1.023e-3;  // [s]
 
 using test::experiment;
-
-// --- LegSlave ------------------------------------------------------------------------------------
-
-/// Three readings, the second of which updates.
-std::int32_t update(LegSlave& slave, int first, int second, int third, int reference) {
-  slave.read(first, reference);
-  slave.read(second, reference);
-  const std::int32_t code = slave.code();
-  slave.read(third, reference);
-  EXPECT_EQ(slave.code(), code);
-  return code;
-}
-
-TEST(LegSlave, AveragesTwoReadingsAndIgnoresTheThird) {
-  LegSlave slave({8500, 0}, 5000);
-  // E = 5010 - (5000 + 5003)/2 = 8.5 counts; 8500 * 8.5 / 256 = 282.2 digits.
-  EXPECT_EQ(update(slave, 5000, 5003, 99, 5010), 282);
-  EXPECT_NEAR(slave.current(), 282 * 3.0517578125e-4 * 4e-3, 1e-15);  // 10 V / 2^15, 4 mA/V
-}
-
-TEST(LegSlave, DerivativeLooksFourUpdatesBack) {
-  LegSlave slave({0, 2560}, 5000);
-  const int x[] = {5000, 5001, 5003, 5006, 5010, 5015};
-  for (int k = 0; k < 6; ++k) {
-    const int before = k < 4 ? 5000 : x[k - 4];
-    EXPECT_EQ(update(slave, x[k], x[k], 0, 5000), -10 * (x[k] - before));  // 2560/256 = 10
-  }
-}
-
-TEST(LegSlave, SaturatesAtTenVolts) {
-  LegSlave slave({8500, 0}, 5000);
-  EXPECT_EQ(update(slave, 5000, 5000, 0, 16383), 32767);
-  EXPECT_EQ(update(slave, 5000, 5000, 0, 0), -32767);
-  EXPECT_NEAR(slave.current(), -0.04, 2e-6);  // 40 mA
-}
-
-TEST(LegSlave, UpdatesEveryThirdReading) {
-  LegSlave slave({8500, 0}, 0);
-  int updates = 0;
-  for (int i = 0; i < 300; ++i) {
-    slave.read(0, 0);
-    updates += slave.updated();
-  }
-  EXPECT_EQ(updates, 100);
-}
-
-// --- Actuator ------------------------------------------------------------------------------------
-
-TEST(Actuator, IsTheOdeSolvedByRungeKutta) {
-  const ActuatorModel model{29.972, 19.558, 0.0064, 0.0, 10.0};
-  struct Drive {
-    double current, K, tau;
-  };
-  const auto rhs = [](double, const double y[], double f[], void* p) {
-    const auto& d = *static_cast<Drive*>(p);
-    f[0] = y[1];
-    f[1] = (d.K * d.current - y[1]) / d.tau;
-    return static_cast<int>(GSL_SUCCESS);
-  };
-  Actuator actuator(model, 1.5);
-  double y[2] = {1.5, 0.0};
-  const double currents[] = {0.01, 0.01, -0.02, 0.003, -0.001, 0.0, 0.04, -0.04};
-  for (double current : currents) {
-    const double dt = 0.341e-3 * 7.3;
-    actuator.advance(current, dt, std::exp(-dt / model.tau));
-    Drive drive{current, current > 0 ? model.gain_extend : model.gain_retract, model.tau};
-    gsl_odeiv2_system system{rhs, nullptr, 2, &drive};
-    gsl_odeiv2_driver* driver =
-        gsl_odeiv2_driver_alloc_y_new(&system, gsl_odeiv2_step_rk8pd, 1e-5, 1e-14, 1e-14);
-    double t = 0.0;
-    ASSERT_EQ(gsl_odeiv2_driver_apply(driver, &t, dt, y), GSL_SUCCESS);
-    gsl_odeiv2_driver_free(driver);
-    EXPECT_NEAR(actuator.length(), y[0], 1e-12);
-    EXPECT_NEAR(actuator.velocity(), y[1], 1e-11);
-    EXPECT_NEAR(actuator.acceleration(), (drive.K * current - y[1]) / model.tau, 1e-8);
-  }
-}
-
-TEST(Actuator, StopsAtItsStroke) {
-  Actuator actuator({30.0, 20.0, 0.0064, 1.2, 1.3}, 1.25);
-  for (int i = 0; i < 1000; ++i) actuator.advance(0.04, 1e-3, std::exp(-1e-3 / 0.0064));
-  EXPECT_EQ(actuator.length(), 1.3);
-  EXPECT_EQ(actuator.velocity(), 0.0);
-  actuator.advance(-0.04, 1e-2, std::exp(-1e-2 / 0.0064));
-  EXPECT_LT(actuator.length(), 1.3);
-}
-
-TEST(Temposonics, CountsToTheNearestAndStaysInFourteenBits) {
-  const Temposonics t{0.9, kMetrePerInch / 363.6};
-  EXPECT_EQ(t.count(0.9 + kMetrePerInch), 364);  // 363.6 counts an inch
-  EXPECT_EQ(t.count(0.9 + 0.49 * t.scale), 0);
-  EXPECT_EQ(t.count(-5.0), 0);
-  EXPECT_EQ(t.count(50.0), 16383);
-}
-
-// --- One leg, closed loop: section 2.4 -----------------------------------------------------------
-
-/// Amplitude and phase of the length's answer to a sine of `hertz`, in one direction of the valve.
-std::complex<double> response(const ActuatorModel& model, double hertz) {
-  const Temposonics transducer{0.0, kMetrePerInch / 363.6};
-  const double mid = 0.5, amplitude = 0.002;
-  LegSlave slave({8500, 0}, transducer.count(mid));
-  Actuator actuator(model, mid);
-  const double dt = 0.341e-3, w = 2 * M_PI * hertz;
-  const int periods = 12, n = static_cast<int>(periods / hertz / dt);
-  std::complex<double> in = 0, out = 0;
-  for (int i = 0; i < 2 * n; ++i) {
-    const double t = i * dt;
-    const double reference = mid + amplitude * std::sin(w * t);
-    actuator.advance(slave.current(), dt, std::exp(-dt / model.tau));
-    slave.read(transducer.count(actuator.length()), transducer.count(reference));
-    if (i < n) continue;
-    in += (reference - mid) * std::polar(1.0, -w * t);
-    out += (actuator.length() - mid) * std::polar(1.0, -w * (t + dt));
-  }
-  return out / in;
-}
-
-TEST(OneLeg, IsMinusNinetyDegreesNearSixToEightHertz) {
-  // Linear loop Kv/(s(tau s+1)+Kv): -90 degrees at sqrt(Kv/tau)/(2 pi), 8.30 Hz extending, 6.70 Hz
-  // retracting; the 1023 us update and the age of X(k) pull it lower by a few percent.
-  for (const auto& [gain, claimed] : {std::pair{29.972, 8.30}, {19.558, 6.70}}) {
-    const ActuatorModel model{gain, gain, 0.0064, 0.0, 1.0};
-    EXPECT_GT(std::arg(response(model, 0.85 * claimed)), -M_PI / 2);
-    EXPECT_LT(std::arg(response(model, 1.02 * claimed)), -M_PI / 2);
-  }
-}
-
-TEST(OneLeg, HasTheVelocityGainOfTheReportsNumbers) {
-  // Kv = K_P/256 * K_DA * 4 mA/V * K * K_T: 17.4 1/s extending. A ramp is followed late by v/Kv.
-  const double Kv = 8500 / 256.0 * (10.0 / 32768) * 4e-3 * 29.972 * (363.6 / kMetrePerInch);
-  EXPECT_NEAR(Kv, 17.4, 0.05);
-  const ActuatorModel model{29.972, 29.972, 0.0064, 0.0, 10.0};
-  const Temposonics transducer{0.0, kMetrePerInch / 363.6};
-  LegSlave slave({8500, 0}, transducer.count(0.1));
-  Actuator actuator(model, 0.1);
-  const double dt = 0.341e-3, v = 0.2;
-  double error = 0.0;
-  for (int i = 0; i < 6000; ++i) {
-    const double reference = 0.1 + v * i * dt;
-    actuator.advance(slave.current(), dt, std::exp(-dt / model.tau));
-    slave.read(transducer.count(actuator.length()), transducer.count(reference));
-    error = reference - actuator.length();
-  }
-  // Beside v/Kv: the feedback is 0.17 ms old, the reference read up to 1 ms late.
-  EXPECT_NEAR(error, v / Kv, v * 1.0e-3);
-}
-
 // --- Force-torque sensor -------------------------------------------------------------------------
 
 TEST(Sensor, SettledReadingIsSprocTimesWrench) {  // (2.6)
@@ -374,6 +226,29 @@ TEST(Plant, CuesCountFromTheSegmentsFirstCommand) {
     ASSERT_EQ(s.q(0) != 0.0, t > 1.5) << t;
     ASSERT_EQ((s.switches & kFloorMatClosed) == 0, t > 1.295 && t < 1.395) << t;
   }
+}
+
+TEST(Plant, ALongLeapIsAsGoodAsManySteps) {  // what is still is passed over; what moves is not
+  PlantConfig config = experiment("z_sine", {"sensor.noise=false"}).plant;
+  const auto run = [&](std::int64_t step) {
+    Plant plant(config);
+    plant.advance(1'000'000'000);
+    LegCommand command;
+    command.counts = plant.sample().legs;
+    command.engaged = true;
+    command.counts[0] -= 6000;  // longer under way than the second that a leap leaves
+    plant.command(command);
+    const std::int64_t end = 20'000'000'000;
+    for (std::int64_t t = plant.time(); t < end; t += step) {
+      plant.command(command);
+      plant.advance(std::min(end, t + step));
+    }
+    return plant.sample();
+  };
+  const Sample many = run(10'000'000), one = run(20'000'000'000);
+  for (std::size_t i = 0; i < kLegs; ++i) EXPECT_NEAR(many.legs[i], one.legs[i], 1) << i;
+  for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(many.adc[i], one.adc[i], 1) << i;
+  EXPECT_LT(many.legs[0], many.legs[1] - 4000);
 }
 
 TEST(Plant, SameSeedSameBytesOtherSeedOthers) {

@@ -7,6 +7,7 @@
 #include "support/momentum.hpp"
 #include "support/poses.hpp"
 #include "support/robots.hpp"
+#include "ves/robot/joint_paths.hpp"
 #include "ves/robot/newton_euler.hpp"
 
 namespace ves {
@@ -176,6 +177,30 @@ TEST(Puma, WeighsWhatItsTableSays) {
   EXPECT_NEAR(F_frame0.f.z(), 318.33, 0.01);
   EXPECT_NEAR(F_frame0.n.x(), 60.31978, 1e-4);
   EXPECT_NEAR(F_frame0.n.y(), -0.77524, 1e-4);
+}
+
+TEST(JointPaths, ANewMoveTakesOverWhereTheJointIsAndMeetsItsTargetAtRest) {
+  JointVector q0 = JointVector::Zero();
+  q0(0) = 0.3;
+  JointPaths joints(2, q0);
+  const std::int64_t s = 1'000'000'000;
+  EXPECT_FALSE(joints.moving(s));
+  ASSERT_TRUE(joints.move({0, 1.0, 2.0}, 5 * s));
+  EXPECT_TRUE(joints.moving(6 * s));
+  const JointState before = joints.at(6 * s + s / 3);
+  ASSERT_TRUE(joints.move({0, -0.5, 1.5}, 6 * s + s / 3));
+  const JointState after = joints.at(6 * s + s / 3);
+  EXPECT_GT(before.q_dot(0), 0.1);
+  EXPECT_NEAR(after.q(0), before.q(0), 1e-12);
+  EXPECT_NEAR(after.q_dot(0), before.q_dot(0), 1e-12);
+  EXPECT_NEAR(after.q_ddot(0), before.q_ddot(0), 1e-12);
+  const std::int64_t end = 6 * s + s / 3 + 3 * s / 2;
+  EXPECT_TRUE(joints.moving(end - 1));
+  EXPECT_FALSE(joints.moving(end));
+  EXPECT_NEAR(joints.at(end).q(0), -0.5, 1e-12);
+  EXPECT_NEAR(joints.at(end).q_dot(0), 0.0, 1e-12);
+  EXPECT_NEAR(joints.at(end - s, 1.0).q(0), joints.at(end).q(0), 1e-12);
+  EXPECT_EQ(joints.at(end).q(1), 0.0);
 }
 
 TEST(Combine, IsTheBodyItIsMadeOf) {  // a bar of two halves

@@ -3,9 +3,6 @@
 // What testPlatform does about what goes wrong: on the plant, in lockstep.
 #include <gtest/gtest.h>
 
-#include <Eigen/SVD>
-#include <random>
-
 #include "support/poses.hpp"
 #include "support/rig.hpp"
 
@@ -20,7 +17,7 @@ using test::sine;
 /// In full swing: z by +-0.2 m, on its way up through the middle.
 void swing(Rig& rig) {
   rig.arm();
-  rig.tick(Request::kRun, sine(2, 0.2, 0.5, 20.0));
+  rig.order(Request::kRun, sine(2, 0.2, 0.5, 20.0));
   rig.run(200);
   ASSERT_GT(rig.state().motion.x_dot(2), 0.6);
 }
@@ -141,7 +138,7 @@ TEST(Safety, OneWrongLegReadingIsNotBelieved) {
 TEST(Safety, AStuckLegStopsAllSix) {
   Rig rig(experiment("z_sine"));
   rig.arm();
-  rig.tick(Request::kRun, sine(2, 0.1, 0.5, 20.0));
+  rig.order(Request::kRun, sine(2, 0.1, 0.5, 20.0));
   rig.run(100);
   rig.disturb([first = std::optional<std::int32_t>()](Sample& s) mutable {
     if (!first) first = s.legs[5];
@@ -166,7 +163,7 @@ TEST(Safety, AFrozenSensorShowsOnceTheWeightTurns) {
   const Experiment e = experiment("puma_tilt", {"sensor.noise=true"});
   Rig rig(e);
   rig.arm();
-  rig.tick(Request::kRun, segment(SegmentKind::kCalibration));
+  rig.order(Request::kRun, segment(SegmentKind::kCalibration));
   rig.until(Phase::kArmed);
   rig.disturb([held = std::optional<AdcCounts>()](Sample& s) mutable {
     if (!held) held = s.adc;
@@ -175,7 +172,7 @@ TEST(Safety, AFrozenSensorShowsOnceTheWeightTurns) {
   EXPECT_EQ(rig.run(300).phase, Phase::kArmed);  // still: nothing to see
   Segment tilt = segment(SegmentKind::kMove, 4.0);
   tilt.target.rpy.x() = 15 * kDegree;
-  rig.tick(Request::kRun, tilt);
+  rig.order(Request::kRun, tilt);
   // The weight of 721 N turns; 50 counts of a channel are 2.3 N or 0.9 N m.
   double turned = 0.0;
   rig.until([&](const TickState& s) {
@@ -189,11 +186,11 @@ TEST(Safety, AFrozenSensorShowsOnceTheWeightTurns) {
 TEST(Safety, AdmittanceControlDoesNotBeginLoaded) {
   Rig rig(experiment("puma_on_table_4_1"));  // not calibrated: 181 N of bias in z
   rig.arm();
-  EXPECT_EQ(rig.tick(Request::kRun, segment(SegmentKind::kAdmittance, 5.0)).refusal,
+  EXPECT_EQ(rig.order(Request::kRun, segment(SegmentKind::kAdmittance, 5.0)).refusal,
             Refusal::kLoaded);
-  rig.tick(Request::kRun, segment(SegmentKind::kCalibration));
+  rig.order(Request::kRun, segment(SegmentKind::kCalibration));
   rig.until(Phase::kArmed);
-  EXPECT_EQ(rig.tick(Request::kRun, segment(SegmentKind::kAdmittance, 5.0)).refusal,
+  EXPECT_EQ(rig.order(Request::kRun, segment(SegmentKind::kAdmittance, 5.0)).refusal,
             Refusal::kNone);
 }
 
@@ -203,7 +200,7 @@ TEST(Safety, CalibrationRefusesAnUnknownLoad) {
   e.controller.sensor.C_proc.row(2) *= -1.0;
   Rig rig(e);
   rig.arm();
-  rig.tick(Request::kRun, segment(SegmentKind::kCalibration));
+  rig.order(Request::kRun, segment(SegmentKind::kCalibration));
   rig.until(Phase::kArmed);
   EXPECT_EQ(rig.state().calibration, Calibration::Status::kRefused);
   EXPECT_EQ(rig.state().violation, StillnessViolation::kBias);
@@ -261,9 +258,9 @@ TEST(Safety, AdmittanceRunPushedAgainstItsLimitsComesToRestInside) {
                                      "base.stiffness_diagonal=[150, 250, 400, 1500, 1000, 2000]"});
     Rig rig(e);
     rig.arm();
-    rig.tick(Request::kRun, segment(SegmentKind::kCalibration));
+    rig.order(Request::kRun, segment(SegmentKind::kCalibration));
     rig.until(Phase::kArmed);
-    rig.tick(Request::kRun, segment(SegmentKind::kAdmittance, 60.0));
+    rig.order(Request::kRun, segment(SegmentKind::kAdmittance, 60.0));
     const Mat6 S_proc = e.plant.sensor.S_proc();
     rig.disturb([&, t = 0](Sample& s) mutable {
       const double ramp = std::min(1.0, ++t / 100.0);
@@ -323,7 +320,7 @@ TEST_P(Paths, ThatFailACheckAreRefusedBeforeTheyBegin) {
   Rig rig(experiment("z_sine"));
   rig.arm();
   const Vec6 x = rig.state().motion.x;
-  rig.tick(Request::kRun, GetParam().segment);
+  rig.order(Request::kRun, GetParam().segment);
   EXPECT_EQ(rig.state().refusal, Refusal::kOutside);
   EXPECT_EQ(rig.state().refused_by, GetParam().check) << name(rig.state().refused_by);
   EXPECT_EQ(rig.run(100).phase, Phase::kArmed);
@@ -345,55 +342,6 @@ INSTANTIATE_TEST_SUITE_P(
                          Check::kActuatorLimits}),
     [](const auto& test) { return std::string(test.param.name); });
 
-TEST(Safety, ConditionNumberIsTheFrobeniusOneOfTheJacobian) {
-  const Geometry g = test::geometry();
-  SafetyLimits limits;
-  for (const Pose& x : test::poses(200)) {
-    const Transform X = g.fromHome(x);
-    // The Jacobian by central differences of the lengths; its inverse by the SVD.
-    Mat6 J;
-    constexpr double h = 1e-6;
-    for (int k = 0; k < 6; ++k) {
-      const auto at = [&](double s) {
-        Transform Y = X;
-        if (k < 3)
-          Y.p(k) += s;
-        else
-          Y.R = rotationOf(s * Vec3::Unit(k - 3)) * Y.R;
-        return legLengths(g, Y);
-      };
-      J.col(k) = (at(h) - at(-h)) / (2.0 * h);
-    }
-    const Eigen::JacobiSVD<Mat6> svd(J);
-    const Vec6 s = svd.singularValues();
-    const double expected = s.norm() * s.cwiseInverse().norm() / 6.0;
-    ASSERT_NEAR(conditionNumber(g, X), expected, 1e-6 * expected);
-    limits.condition = expected * 1.001;
-    EXPECT_TRUE(conditioningCheck(limits, g, X));
-    limits.condition = expected * 0.999;
-    EXPECT_FALSE(conditioningCheck(limits, g, X));
-  }
-  EXPECT_FALSE(conditioningCheck(limits, g, {Mat3::Identity(), {NAN, 0.0, 1.35}}));
-  // Flat: the legs cannot hold it.
-  EXPECT_FALSE(conditioningCheck(limits, g, {Mat3::Identity(), {0.0, 0.0, 0.0}}));
-}
-
-TEST(Safety, NoLegLiesDownOnAPlate) {
-  const Geometry g = test::geometry();
-  SafetyLimits limits;
-  limits.leg_clearance = 0.0;
-  const Transform home = g.fromHome({});
-  double least = 1e9;
-  for (std::size_t i = 0; i < kLegs; ++i) {
-    const Vec3 leg = home * g.p_PPi_P[i] - g.p_IBi_I[i];
-    least = std::min(least, std::asin(leg.z() / leg.norm()));
-  }
-  limits.plate_angle = least - 1e-6;
-  EXPECT_TRUE(collideCheck(limits, g, home));
-  limits.plate_angle = least + 1e-6;
-  EXPECT_FALSE(collideCheck(limits, g, home));
-}
-
 TEST(Safety, WhatTheLoopFeedsIsStoppedBeforeItIsLarge) {
   // Appendix E: a base of 4 Hz, six times lighter than the robot on it. The robot stands still.
   const Experiment e = experiment(
@@ -414,86 +362,6 @@ TEST(Safety, WhatTheLoopFeedsIsStoppedBeforeItIsLarge) {
   EXPECT_LT(largest, 0.05);
   rig.run(50);
   EXPECT_EQ(rig.tick(Request::kReset).phase, Phase::kDisarmed);
-}
-
-// --- Silent legs ---------------------------------------------------------------------------------
-
-class Silence : public testing::Test {
- protected:
-  Silence()
-      : e_(experiment("z_sine", {"initial_pose={x_m: 0.05, z_m: 0.08, gamma_deg: 3}"})),
-        plant_(e_.plant) {
-    LegCommand c;
-    c.engaged = true;
-    c.park = true;
-    c.counts =
-        legCounts(e_.controller.legs,
-                  legLengths(e_.plant.geometry, e_.plant.geometry.fromHome(e_.plant.initial_pose)));
-    command_ = c;
-  }
-  double away() {
-    plant_.sample();
-    return plant_.truth().x.stacked().norm();
-  }
-  static constexpr std::int64_t kSecond = 1'000'000'000;
-  /// In steps: a leap of the plant's time would count as time that was commanded.
-  void wait(int seconds) {
-    for (int s = 0; s < seconds; ++s) plant_.advance(plant_.time() + kSecond);
-  }
-  Experiment e_;
-  plant::Plant plant_;
-  LegCommand command_;
-};
-
-TEST_F(Silence, LegsHoldAndThenGoHomeSlowly) {
-  plant_.command(command_);
-  const double start = away();
-  for (int s = 1; s < 10; ++s) {
-    plant_.advance(s * kSecond);
-    EXPECT_NEAR(away(), start, 1e-3) << s;
-  }
-  double fastest = 0.0;
-  for (std::int64_t t = 10 * kSecond; t < 31 * kSecond; t += kSecond / 100) {
-    plant_.advance(t);
-    plant_.sample();
-    fastest = std::max(fastest, plant_.truth().P.v.norm());
-  }
-  EXPECT_LT(away(), 1e-3);
-  EXPECT_LT(fastest, 0.05);
-  EXPECT_TRUE(plant_.truth().parking);
-}
-
-TEST_F(Silence, LegsStayWhenTheLastCommandSaidSo) {
-  command_.park = false;  // a stop by a check
-  plant_.command(command_);
-  const double start = away();
-  wait(40);
-  EXPECT_NEAR(away(), start, 1e-3);
-}
-
-TEST_F(Silence, LegsStayWhileASafetyLoopIsOpen) {
-  command_.segment = 0;
-  e_.plant.faults = {{{0, kSecond}, 100 * kSecond, plant::Fault::kPanicButton, 0, 0.0}};
-  plant::Plant plant(e_.plant);
-  plant.command(command_);
-  for (int s = 1; s < 40; ++s) {
-    plant.advance(s * kSecond);
-    plant.sample();
-  }
-  EXPECT_NEAR(plant.truth().x.stacked().norm(), e_.plant.initial_pose.stacked().norm(), 1e-3);
-}
-
-TEST_F(Silence, ACommandTakesTheLegsBackWithoutAStep) {
-  plant_.command(command_);
-  wait(20);
-  const Sample s = plant_.sample();
-  EXPECT_TRUE(plant_.truth().parking);
-  command_.counts = s.legs;
-  plant_.command(command_);
-  const double then = away();
-  wait(1);
-  EXPECT_NEAR(away(), then, 1e-3);
-  EXPECT_FALSE(plant_.truth().parking);
 }
 
 }  // namespace

@@ -171,6 +171,22 @@ TEST(SensorBias, ATareAveragesNewSamplesOnlyAndRefusesALoad) {
   }
 }
 
+TEST(Calibration, AllowsExactlyTheCountsThatItsLimitSays) {
+  StillnessLimits limits = puma().stillness;
+  limits.leg_counts = 3;
+  for (const int moved : {3, 4, -3, -4}) {
+    Calibration calibration(limits);
+    calibration.begin();
+    Sample sample = numbered(0);
+    sample.legs.fill(9000);
+    calibration.add(sample, Vec6::Zero());
+    sample.legs[4] += moved;
+    calibration.add(sample, Vec6::Zero());
+    EXPECT_EQ(calibration.violation(),
+              std::abs(moved) > 3 ? StillnessViolation::kLeg : StillnessViolation::kNone);
+  }
+}
+
 TEST(SensorBias, ACalibrationThatSucceedsSetsBiasDeviationAndError) {
   SensorBias bias(puma());
   bias.beginCalibration();
@@ -264,16 +280,29 @@ TEST(MotionPlan, AGentleMoveKeepsThePeakSpeedsAndAtLeastASecond) {
       MotionPlan::move(kSettings, moving(Vec6::Zero(), Vec6::Zero()), 1e-6 * far, 0.0).steps(),
       100);
   EXPECT_EQ(MotionPlan::move(kSettings, moving(Vec6::Zero(), Vec6::Zero()), far, 2.0).steps(), 200);
+  // Only the way counts, not where it begins.
+  const Vec6 from = Vec6::LinSpaced(0.1, -0.2);
+  EXPECT_EQ(MotionPlan::move(kSettings, moving(from, Vec6::Zero()), Vec6(from + far), 0.0).steps(),
+            MotionPlan::move(kSettings, moving(Vec6::Zero(), Vec6::Zero()), far, 0.0).steps());
 }
 
-TEST(MotionPlan, FirstFailureNamesTheCheckThatAStepByStepWalkMeets) {
+TEST(Rehearsal, NamesTheCheckThatAStepByStepWalkMeetsSomePosesATick) {
   const ControllerConfig& c = puma();
   const PathChecks checks(c.safety, c.geometry);
   const Vec6 L = legLengths(c.geometry, c.geometry.fromHome({}));
   const auto failure = [&](const Segment& s) {
     const MotionPlan plan =
         MotionPlan::of({c.periodSeconds(), c.gentle}, s, moving(Vec6::Zero(), Vec6::Zero()));
-    return firstFailure(plan, checks, L, c.periodSeconds(), c.path);
+    Rehearsal rehearsal;
+    rehearsal.begin(plan, L);
+    std::int64_t ticks = 0;
+    for (; rehearsal.underWay(); ++ticks) rehearsal.advance(checks, c.periodSeconds(), c.path);
+    const std::int64_t enough = plan.steps() / Rehearsal::kPosesATick + 1;
+    EXPECT_LE(ticks, enough);
+    if (rehearsal.failure() == Check::kCount) {
+      EXPECT_EQ(ticks, enough);
+    }
+    return rehearsal.failure();
   };
   EXPECT_EQ(failure(test::sine(2, 0.2, 0.5, 4.0)), Check::kCount);
   EXPECT_EQ(failure(test::sine(2, 0.31, 0.1, 10.0)), Check::kMotionLimits);
@@ -330,6 +359,23 @@ TEST(LegCommander, WithTheLagTakenOutExpectsTheCommandBroughtToNowAndStaysInside
   EXPECT_EQ(commander.reference(), Vec6::Constant(c.safety.leg_min));
 }
 
+TEST(LegCommander, TakesOutWhatTheTransducersWillRound) {
+  ControllerConfig c = puma();
+  c.compensation.observer = true;
+  const double scale = c.servo.readings.scale(0);
+  ServoObserver servo(c.servo, c.periodSeconds());
+  LegMotion legs;
+  legs.L = legLengths(c.legs, legCounts(c.legs, Vec6::Constant(1.5))).array() + 0.3 * scale;
+  servo.reset(legs.L);
+  LegCommander commander(c);
+  commander.command(legs, true, 0, 0.0, 1.0, servo);
+  for (const double share : {0.0, 0.5, 1.0}) {
+    commander.command(legs, true, 0, 0.0, share, servo);
+    const Vec6 taken = commander.reference() - legs.L;
+    EXPECT_LT((taken.array() + share * 0.3 * scale).abs().maxCoeff(), 1e-6 * scale) << share;
+  }
+}
+
 TEST(LegCommander, CarriesWhatRoundingLeavesInAdmittanceControlOnly) {
   ControllerConfig c = puma();
   c.compensation.observer = true;
@@ -348,301 +394,6 @@ TEST(LegCommander, CarriesWhatRoundingLeavesInAdmittanceControlOnly) {
     else
       EXPECT_GT(std::abs(sum), 10.0 * c.legs.scale(0));
   }
-}
-
-// Monitors
-
-TEST(Overruns, OneStallOrTooManyInASecondAndNoMoreAfterIt) {
-  SafetyLimits limits;
-  limits.stall_ticks = 3;
-  limits.overruns = 2;
-  Overruns overruns;
-  overruns.take(10, 3);
-  EXPECT_TRUE(overruns.good(limits, 100));
-  overruns.take(20, 4);  // one stall too long
-  EXPECT_FALSE(overruns.good(limits, 100));
-  overruns.take(21, 0);
-  EXPECT_TRUE(overruns.good(limits, 100));
-  overruns.take(30, 1);  // the third in a second
-  EXPECT_FALSE(overruns.good(limits, 100));
-  overruns.take(110, 0);  // the first is 100 ticks ago: still within the second
-  EXPECT_FALSE(overruns.good(limits, 100));
-  overruns.take(111, 0);
-  EXPECT_TRUE(overruns.good(limits, 100));
-}
-
-TEST(Oscillation, NeedsGrowthInEveryWindowAboveItsFloorWhileTheRobotStands) {
-  SafetyLimits limits;
-  limits.growing_windows = 4;
-  const double floor = 0.05, period = 0.01;
-  const auto windows = [&](double first, double factor, int n, double moved = 0.0) {
-    Oscillation o;
-    JointVector q = JointVector::Zero();
-    double energy = first;
-    for (int w = 0; w < n; ++w, energy *= factor)
-      for (int i = 0; i < 50; ++i) {
-        q(0) += moved;
-        o.take(energy, false, q, 1e-3, period, floor);
-      }
-    return o.good(limits);
-  };
-  EXPECT_FALSE(windows(1.0, 1.3, 6));
-  EXPECT_TRUE(windows(1.0, 1.3, 4));         // the first window has none before it
-  EXPECT_TRUE(windows(1.0, 1.15, 20));       // grows, but by less than a fifth
-  EXPECT_TRUE(windows(1e-6, 1.3, 20));       // below the floor
-  EXPECT_TRUE(windows(1.0, 1.3, 6, 2e-3));   // the robot moves: that is where the energy is from
-  EXPECT_FALSE(windows(1.0, 1.3, 6, 1e-6));  // as good as standing
-}
-
-TEST(Oscillation, SwingingOnAgainstTheEnvelopeCountsAsGrowth) {
-  SafetyLimits limits;
-  limits.growing_windows = 4;
-  Oscillation o;
-  for (int i = 0; i < 4 * 50 + 1; ++i)
-    o.take(1.0, i % 50 == 7, JointVector::Zero(), 1e-3, 0.01, 0.05);
-  EXPECT_FALSE(o.good(limits));
-  o.reset();
-  EXPECT_TRUE(o.good(limits));
-}
-
-TEST(FrozenSensor, TripsWhenTheWeightTurnsUnderEqualReadings) {
-  SafetyLimits limits;
-  limits.frozen_samples = 3;
-  limits.frozen_counts = 50.0;
-  FrozenSensor sensor;
-  AdcCounts adc{};
-  sensor.take(adc, Vec6::Zero());
-  for (int n = 0; n < 10; ++n) sensor.take(adc, Vec6::Zero());
-  EXPECT_TRUE(sensor.good(limits));  // nothing should have changed
-  sensor.take(adc, 51.0 * Vec6::Unit(3));
-  EXPECT_FALSE(sensor.good(limits));
-  adc[6] += 1;  // the pressure is no part of it
-  sensor.take(adc, 51.0 * Vec6::Unit(3));
-  EXPECT_FALSE(sensor.good(limits));
-  adc[2] += 1;
-  sensor.take(adc, 51.0 * Vec6::Unit(3));
-  EXPECT_TRUE(sensor.good(limits));
-}
-
-TEST(LegReadings, AllowsWhatALegCanDoAndOneErrorInARow) {
-  LegReadings readings;
-  const Vec6 at = Vec6::Constant(1.5), still = Vec6::Zero();
-  readings.take(at, still, 0.01, 0.002);
-  EXPECT_EQ(readings.take(Vec6(at + 0.0019 * Vec6::Unit(0)), still, 0.01, 0.002)(0), 1.5019);
-  const Vec6 jumped = at + 0.01 * Vec6::Unit(4);
-  EXPECT_NE(readings.take(jumped, still, 0.01, 0.002), jumped);
-  EXPECT_TRUE(readings.good());
-  EXPECT_NE(readings.take(jumped, still, 0.01, 0.002), jumped);
-  EXPECT_FALSE(readings.good());
-  readings.reset();
-  EXPECT_EQ(readings.take(jumped, still, 0.01, 0.002), jumped);
-  EXPECT_TRUE(readings.good());
-  // A leg that was told 0.4 m/s may come 6 mm further in 10 ms, beside the jump.
-  EXPECT_EQ(readings.take(Vec6(jumped + 0.0079 * Vec6::Unit(1)), Vec6::Constant(0.4), 0.01, 0.002),
-            Vec6(jumped + 0.0079 * Vec6::Unit(1)));
-  EXPECT_NE(readings.take(Vec6(jumped + 0.0165 * Vec6::Unit(1)), Vec6::Constant(0.4), 0.01, 0.002),
-            Vec6(jumped + 0.0165 * Vec6::Unit(1)));
-}
-
-// Decisions
-
-/// A supervisor with everything around it.
-struct Desk {
-  explicit Desk(const ControllerConfig& config)
-      : c(config), path(c.safety, c.geometry), motion(c), bias(c), share(c.compensation, 0.01) {
-    for (int n = 0; n <= c.arming_samples; ++n) stream.update(numbered(n), false, false);
-  }
-  Situation now() { return {c, path, tick, stream.freshTicks(), dynamic, M_1, L}; }
-  Actuation act() { return {motion, bias, stream, share}; }
-  TickState order(Request request, const Segment& segment = {}) {
-    supervisor.handle({request, segment, {1, tick}}, now(), act());
-    return advance();
-  }
-  TickState advance() {
-    supervisor.advance(now(), act());
-    if (supervisor.moves()) motion.commit(motion.trajectoryGeneration(), false);
-    supervisor.trip(tripped, now(), act());
-    ++tick;
-    TickState state;
-    supervisor.report(state);
-    return state;
-  }
-  void arm() {
-    order(Request::kArm);
-    advance();
-  }
-
-  ControllerConfig c;
-  PathChecks path;
-  MotionGenerator motion;
-  SensorBias bias;
-  SampleStream stream;
-  CompensationShare share;
-  Supervisor supervisor;
-  Wrench dynamic;
-  Mat6 M_1 = Mat6::Zero();
-  Vec6 L = legLengths(c.geometry, c.geometry.fromHome({}));
-  Tripped tripped;
-  std::int64_t tick = 0;
-};
-
-Tripped only(Check check) {
-  Tripped t;
-  t.require(check, false);
-  return t;
-}
-
-TEST(Supervisor, AdmittanceControlNeedsAVerdictAndALightSensor) {
-  const Segment admittance = test::segment(SegmentKind::kAdmittance, 5.0);
-  const std::pair<Stability, Refusal> cases[] = {{Stability::kUnknown, Refusal::kUnassessed},
-                                                 {Stability::kUnstable, Refusal::kUnstable},
-                                                 {Stability::kStable, Refusal::kNone},
-                                                 {Stability::kForced, Refusal::kNone}};
-  for (const auto& [stability, refusal] : cases) {
-    ControllerConfig config = puma();
-    config.stability = config.stability_uncompensated = stability;
-    Desk desk(config);
-    desk.arm();
-    EXPECT_EQ(desk.order(Request::kRun, admittance).refusal, refusal);
-    EXPECT_EQ(desk.supervisor.phase(), refusal == Refusal::kNone ? Phase::kRunning : Phase::kArmed);
-  }
-  for (const bool moment : {false, true}) {
-    const SafetyLimits& limits = puma().safety;
-    const double most = moment ? limits.start_moment : limits.start_force;
-    for (const double share : {0.999, 1.001}) {
-      Desk desk(puma());
-      desk.arm();
-      (moment ? desk.dynamic.n : desk.dynamic.f) = share * most * Vec3(0.6, 0.0, -0.8);
-      const bool light = share < 1.0;
-      EXPECT_EQ(desk.order(Request::kRun, admittance).refusal,
-                light ? Refusal::kNone : Refusal::kLoaded);
-    }
-    Desk desk(puma());
-    desk.arm();
-    (moment ? desk.dynamic.n : desk.dynamic.f).x() = kNan;
-    EXPECT_EQ(desk.order(Request::kRun, admittance).refusal, Refusal::kLoaded);
-  }
-}
-
-TEST(Supervisor, TheVerdictIsOfTheLoopAsItIsCompensated) {
-  ControllerConfig config = puma();
-  config.compensation.feed_forward = true;
-  config.stability = Stability::kStable;
-  config.stability_uncompensated = Stability::kUnstable;
-  Desk desk(config);
-  desk.arm();
-  EXPECT_EQ(desk.order(Request::kUncompensate).refusal, Refusal::kNone);  // nothing runs
-  const Segment admittance = test::segment(SegmentKind::kAdmittance, 5.0);
-  EXPECT_EQ(desk.order(Request::kRun, admittance).refusal, Refusal::kUnstable);
-  EXPECT_EQ(desk.order(Request::kCompensate).refusal, Refusal::kNone);
-  EXPECT_EQ(desk.order(Request::kRun, admittance).refusal, Refusal::kNone);
-  EXPECT_EQ(desk.order(Request::kUncompensate).refusal, Refusal::kUnstable);
-  EXPECT_TRUE(desk.share.wanted());
-}
-
-TEST(Supervisor, ARefusedPathNamesItsCheckAndChangesNothing) {
-  Desk desk(puma());
-  desk.arm();
-  const TickState before = desk.advance();
-  const TickState after = desk.order(Request::kRun, test::sine(2, 0.4, 0.2, 5.0));
-  EXPECT_EQ(after.refusal, Refusal::kOutside);
-  EXPECT_EQ(after.refused_by, Check::kMotionLimits);
-  EXPECT_EQ(after.phase, before.phase);
-  EXPECT_EQ(desk.motion.motion().x, Vec6::Zero());
-}
-
-TEST(Supervisor, ASecondTripOfATickIsLatchedAndTheFirstCauseStays) {
-  Desk desk(puma());
-  desk.arm();
-  desk.order(Request::kRun, test::sine(2, 0.1, 0.5, 5.0));
-  for (int n = 0; n < 30; ++n) desk.advance();
-  desk.tripped = only(Check::kStale);
-  TickState state = desk.advance();
-  EXPECT_EQ(state.phase, Phase::kStopping);
-  EXPECT_EQ(state.cause, Check::kStale);
-  desk.supervisor.tripStopping(only(Check::kPressure), desk.act());  // does not freeze
-  EXPECT_EQ(desk.supervisor.phase(), Phase::kStopping);
-  desk.supervisor.tripStopping(only(Check::kCollide), desk.act());
-  desk.supervisor.report(state);
-  EXPECT_EQ(state.phase, Phase::kStopped);
-  EXPECT_TRUE(state.latched.has(Check::kCollide));
-  EXPECT_FALSE(state.latched.has(Check::kPressure));
-  EXPECT_EQ(state.cause, Check::kStale);
-}
-
-TEST(Supervisor, ATripEndsATareAndAStopLastsUntilAResetWithoutACause) {
-  Desk desk(puma());
-  desk.arm();
-  desk.order(Request::kTare);
-  EXPECT_TRUE(desk.bias.taring());
-  EXPECT_EQ(desk.order(Request::kTare).refusal, Refusal::kBusy);
-  desk.tripped = only(Check::kPanicButton);
-  EXPECT_EQ(desk.advance().phase, Phase::kStopped);
-  EXPECT_FALSE(desk.bias.taring());
-  EXPECT_EQ(desk.order(Request::kReset).refusal, Refusal::kCauseRemains);
-  EXPECT_EQ(desk.order(Request::kArm).refusal, Refusal::kNotArmed);
-  EXPECT_EQ(desk.order(Request::kHold).refusal, Refusal::kNotArmed);
-  desk.tripped = {};
-  desk.advance();
-  const TickState state = desk.order(Request::kReset);
-  EXPECT_EQ(state.refusal, Refusal::kNone);
-  EXPECT_EQ(state.phase, Phase::kDisarmed);
-  EXPECT_EQ(state.cause, Check::kCount);
-  EXPECT_FALSE(state.latched.any());
-  EXPECT_EQ(desk.stream.freshTicks(), 0);
-  EXPECT_EQ(desk.order(Request::kReset).refusal, Refusal::kNotStopped);
-}
-
-TEST(Supervisor, ARequestToArmDoesNotOutliveACause) {
-  Desk desk(puma());
-  desk.tripped = only(Check::kPanicButton);
-  desk.advance();
-  EXPECT_EQ(desk.order(Request::kArm).refusal, Refusal::kCauseRemains);
-  desk.tripped = {};
-  desk.advance();
-  desk.advance();
-  EXPECT_EQ(desk.supervisor.phase(), Phase::kDisarmed);
-  desk.tripped = only(Check::kStale);  // a stream that has not begun is no cause
-  desk.advance();
-  EXPECT_EQ(desk.order(Request::kArm).refusal, Refusal::kNone);
-  EXPECT_EQ(desk.supervisor.phase(), Phase::kDisarmed);
-  desk.tripped = {};
-  desk.advance();
-  desk.advance();
-  EXPECT_EQ(desk.supervisor.phase(), Phase::kArmed);
-}
-
-TEST(Supervisor, ACauseThatComesWhileTheStreamIsAwaitedDropsTheRequest) {
-  Desk desk(puma());
-  desk.stream.restart();
-  EXPECT_EQ(desk.order(Request::kArm).refusal, Refusal::kNone);
-  desk.tripped = only(Check::kPanicButton);
-  desk.advance();
-  desk.tripped = {};
-  desk.advance();
-  desk.advance();
-  for (int n = 100; n <= 100 + desk.c.arming_samples; ++n)
-    desk.stream.update(numbered(n), false, false);
-  desk.advance();
-  EXPECT_EQ(desk.supervisor.phase(), Phase::kDisarmed);
-}
-
-TEST(Supervisor, AStopBrakesFromMotionAndFreezesAtOnceFromRest) {
-  Desk desk(puma());
-  desk.arm();
-  desk.tripped = only(Check::kPressure);
-  EXPECT_EQ(desk.advance().phase, Phase::kStopped);  // nothing to brake
-
-  Desk swinging(puma());
-  swinging.arm();
-  swinging.order(Request::kRun, test::sine(2, 0.1, 0.5, 5.0));
-  for (int n = 0; n < 10; ++n) swinging.advance();
-  swinging.tripped = only(Check::kPressure);
-  EXPECT_EQ(swinging.advance().phase, Phase::kStopping);
-  int ticks = 0;
-  while (swinging.advance().phase == Phase::kStopping && ticks < 100) ++ticks;
-  EXPECT_EQ(swinging.supervisor.phase(), Phase::kStopped);
-  EXPECT_EQ(swinging.motion.motion().x_dot.norm(), 0.0);
 }
 
 }  // namespace

@@ -79,23 +79,33 @@ PathPoint<6> MotionPlan::at(std::int64_t n, const RecordedPath& path) const noex
   return t < brake_.duration() ? brake_.at(t) : move_.at(t - brake_.duration());
 }
 
-Check firstFailure(const MotionPlan& plan, const PathChecks& checks, const Vec6& L, double period,
-                   const RecordedPath& path) noexcept {
-  const std::int64_t stride = std::max<std::int64_t>(1, plan.steps() / kPathSamples);
-  Vec6 L_last = L;
-  for (std::int64_t n = 0; n <= plan.steps(); n += stride) {
-    const PathPoint<6> at = plan.at(n, path);
+void Rehearsal::begin(const MotionPlan& plan, const Vec6& L) noexcept {
+  plan_ = plan;
+  n_ = 0;
+  L_last_ = L;
+  failure_ = Check::kCount;
+  under_way_ = true;
+}
+
+void Rehearsal::advance(const PathChecks& checks, double period,
+                        const RecordedPath& path) noexcept {
+  const std::int64_t stride = std::max<std::int64_t>(1, plan_.steps() / kPoses);
+  const std::int64_t until = std::min(plan_.steps(), n_ + (kPosesATick - 1) * stride);
+  for (; n_ <= until; n_ += stride) {
+    const PathPoint<6> at = plan_.at(n_, path);
     const Pose x = Pose::from(at.x);
     const BodyMotion P = bodyMotion(checks.geometry(), x, at.x_dot, at.x_ddot);
     const LegMotion legs = legMotion(checks.geometry(), P);
     // From one sample to the next, and at the sample itself.
-    const double since = static_cast<double>(n == 0 ? 1 : stride) * period;
-    const Tripped t = checks.pose(P.X, x, legs.L) | checks.step(legs.L, L_last, since) |
+    const double since = static_cast<double>(n_ == 0 ? 1 : stride) * period;
+    const Tripped t = checks.pose(P.X, x, legs.L) | checks.step(legs.L, L_last_, since) |
                       checks.step(legs.L + period * legs.L_dot, legs.L, period);
-    if (t.any()) return t.first();
-    L_last = legs.L;
+    L_last_ = legs.L;
+    if (!t.any()) continue;
+    failure_ = t.first();
+    break;
   }
-  return Check::kCount;
+  under_way_ = failure_ == Check::kCount && n_ <= plan_.steps();
 }
 
 }  // namespace ves

@@ -55,6 +55,7 @@ std::string_view name(Refusal refusal) noexcept {
     case Refusal::kNoCompensation: return "the configuration has no compensation";
     case Refusal::kUnassessed: return "the stability of this loop has not been checked";
     case Refusal::kLoaded: return "the measured wrench is too large: calibrate, or remove the load";
+    case Refusal::kChecking: return "its path is being checked";
     case Refusal::kCount: break;
   }
   return "unknown";

@@ -29,6 +29,7 @@ void Supervisor::handle(const Order& order, const Situation& now, Actuation act)
   if (order.request == Request::kNone) return;
   order_ = order.id;
   refusal_ = obey(order, now, act);
+  if (refusal_ == Refusal::kChecking) rehearsed_ = order;
 }
 
 Refusal Supervisor::obey(const Order& order, const Situation& now, Actuation act) noexcept {
@@ -39,12 +40,14 @@ Refusal Supervisor::obey(const Order& order, const Situation& now, Actuation act
     case Request::kStart: return arm(order.request, now, act);
     case Request::kStop:
       pending_request_ = Request::kNone;
+      rehearsal_.cancel();
       if (phase_ == Phase::kArmed || phase_ == Phase::kRunning) beginReturn(now, act);
       operator_present_ = false;
       return Refusal::kNone;
     case Request::kRun: return run(order.segment, now, act);
     case Request::kHold:
       pending_request_ = Request::kNone;
+      rehearsal_.cancel();
       if (!ours()) return Refusal::kNotArmed;
       operator_present_ = true;
       if (phase_ == Phase::kArmed) return Refusal::kNone;
@@ -81,29 +84,42 @@ Refusal Supervisor::arm(Request request, const Situation& now, Actuation act) no
     return Refusal::kNone;
   }
   if (request == Request::kArm) return ours() ? Refusal::kArmed : Refusal::kNotArmed;
-  if (phase_ != Phase::kArmed) return ours() ? Refusal::kBusy : Refusal::kNotArmed;
+  if (phase_ != Phase::kArmed || rehearsal_.underWay())
+    return ours() ? Refusal::kBusy : Refusal::kNotArmed;
   beginProgram(0, now, act);
   return Refusal::kNone;
 }
 
-/// Begins an order's segment, unless its path, gone through beforehand, fails a check.
+/// Begins an order's segment; one with a path once that has been gone through.
 Refusal Supervisor::run(const Segment& segment, const Situation& now, Actuation act) noexcept {
   if (!ours()) return Refusal::kNotArmed;
-  if (phase_ != Phase::kArmed) return Refusal::kBusy;
+  if (phase_ != Phase::kArmed || rehearsal_.underWay()) return Refusal::kBusy;
   if (segment.kind == SegmentKind::kAdmittance) {
     const Refusal refusal = refusesAdmittance(now, act);
     if (refusal != Refusal::kNone) return refusal;
   }
   if (segment.kind == SegmentKind::kMove || segment.kind == SegmentKind::kTrajectory) {
-    const Check failure = firstFailure(act.motion.planned(segment), now.path, now.L,
-                                       now.config.periodSeconds(), act.motion.path());
-    if (failure != Check::kCount) {
-      refused_by_ = failure;
-      return Refusal::kOutside;
-    }
+    rehearsal_.begin(act.motion.planned(segment), now.L);
+    return Refusal::kChecking;
   }
   begin(segment, now, act);
   return Refusal::kNone;
+}
+
+/// Some of a path that was ordered; then its segment begins, or is refused. Armed, nothing moves:
+/// the path still begins where it was planned from.
+void Supervisor::rehearse(const Situation& now, Actuation act) noexcept {
+  if (!rehearsal_.underWay()) return;
+  rehearsal_.advance(now.path, now.config.periodSeconds(), act.motion.path());
+  if (rehearsal_.underWay()) return;
+  order_ = rehearsed_.id;
+  if (rehearsal_.failure() == Check::kCount) {
+    refusal_ = Refusal::kNone;
+    begin(rehearsed_.segment, now, act);
+  } else {
+    refusal_ = Refusal::kOutside;
+    refused_by_ = rehearsal_.failure();
+  }
 }
 
 /// A loop that runs is not changed to one that would diverge.
@@ -150,6 +166,7 @@ void Supervisor::advance(const Situation& now, Actuation act) noexcept {
     case Phase::kArmed:
       if (pending_request_ == Request::kStart) beginProgram(0, now, act);
       pending_request_ = Request::kNone;
+      rehearse(now, act);
       break;
     case Phase::kRunning:
       if (segmentIsOver(now, act)) endSegment(now, act);
@@ -230,6 +247,11 @@ void Supervisor::beginReturn(const Situation& now, Actuation act) noexcept {
 bool Supervisor::trip(Tripped tripped, const Situation& now, Actuation act) noexcept {
   tripped_ = tripped;
   if (phase_ == Phase::kDisarmed || !tripped.any()) return false;
+  if (rehearsal_.underWay()) {
+    rehearsal_.cancel();
+    order_ = rehearsed_.id;
+    refusal_ = Refusal::kNotArmed;
+  }
   latch(tripped, act);
   if (phase_ == Phase::kStopped) return false;
   const bool stopping = phase_ == Phase::kStopping;

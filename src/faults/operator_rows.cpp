@@ -152,8 +152,13 @@ FaultOutcome farFromHome(Lockstep loop) {
 
 FaultOutcome pathRefused(Lockstep loop) {
   arm(loop);
-  const Check outside = loop.step(ask(Request::kRun, sine(0.4, 0.2, 5.0))).refused_by;
-  const Check fast = loop.step(ask(Request::kRun, sine(0.2, 3.0, 5.0))).refused_by;
+  const auto refusedBy = [&](const Segment& path) {
+    loop.step(ask(Request::kRun, path));
+    ticksUntil(loop, [](const TickState& s) { return s.refusal != Refusal::kChecking; });
+    return loop.state().refused_by;
+  };
+  const Check outside = refusedBy(sine(0.4, 0.2, 5.0));
+  const Check fast = refusedBy(sine(0.2, 3.0, 5.0));
   const double moved = legError(loop);
   return outcome(
       outside == Check::kMotionLimits && fast == Check::kVelocity &&

@@ -22,19 +22,19 @@ constexpr double kLegSlack = 0.01;  // [m] by which a leg may swing past a limit
 /// A controller and a plant as processes, the controller in full swing.
 class Pair {
  public:
-  Pair(const fs::path& config, const fs::path& programs)
-      : programs_(programs),
+  Pair(const fs::path& config, const fs::path& program)
+      : program_(program),
         file_((config / "scenarios" / "z_sine.yaml").string()),
         limits_(loadExperiment(file_).controller.safety) {
-    plant = std::make_unique<Process>(programs / "ves-plant", Arguments{file_});
+    plant = std::make_unique<Process>(program, Arguments{"plant", file_});
     startController({"--start"});
   }
   void startController(Arguments arguments) {
-    arguments.insert(arguments.begin(), file_);
+    arguments.insert(arguments.begin(), {"controller", file_});
     // The machine may be busy; what a row injects is not that.
     for (const char* set : {"safety.stall_ticks=60", "safety.overruns_per_second=50"})
       arguments.insert(arguments.end(), {"--set", set});
-    controller = std::make_unique<Process>(programs_ / "ves-controller", arguments);
+    controller = std::make_unique<Process>(program_, arguments);
   }
   bool swinging(BusObserver& bus, std::int64_t commands = 300) const {
     const std::int64_t from = bus.engaged;
@@ -45,7 +45,7 @@ class Pair {
   std::unique_ptr<Process> plant, controller;
 
  private:
-  fs::path programs_;
+  fs::path program_;
   std::string file_;
   SafetyLimits limits_;
 };
@@ -84,9 +84,9 @@ void floodMalformed(int count) {
 
 FaultOutcome neverSwung() { return outcome(false, "never in swing"); }
 
-FaultOutcome plantKilled(const fs::path& config, const fs::path& programs) {
+FaultOutcome plantKilled(const fs::path& config, const fs::path& program) {
   BusObserver bus;
-  Pair pair(config, programs);
+  Pair pair(config, program);
   if (!pair.swinging(bus)) return neverSwung();
   pair.plant->signal(SIGKILL);
   pair.plant->wait();
@@ -101,10 +101,10 @@ FaultOutcome plantKilled(const fs::path& config, const fs::path& programs) {
   return out;
 }
 
-FaultOutcome controllerKilled(const fs::path& config, const fs::path& programs,
+FaultOutcome controllerKilled(const fs::path& config, const fs::path& program,
                               std::int64_t commands) {
   BusObserver bus;
-  Pair pair(config, programs);
+  Pair pair(config, program);
   if (!pair.swinging(bus, commands)) return neverSwung();
   pair.controller->signal(SIGKILL);
   pair.controller->wait();
@@ -122,9 +122,9 @@ FaultOutcome controllerKilled(const fs::path& config, const fs::path& programs,
                   margin(bus, pair.limits()), bus.engaged - engaged, bus.states - states));
 }
 
-FaultOutcome malformedFlood(const fs::path& config, const fs::path& programs) {
+FaultOutcome malformedFlood(const fs::path& config, const fs::path& program) {
   BusObserver bus;
-  Pair pair(config, programs);
+  Pair pair(config, program);
   if (!pair.swinging(bus, 100)) return neverSwung();
   floodMalformed(100'000);
   const bool alive = pair.plant->running();
@@ -139,11 +139,11 @@ FaultOutcome malformedFlood(const fs::path& config, const fs::path& programs) {
                              rests ? "rest" : "MOVE", margin(bus, pair.limits())));
 }
 
-FaultOutcome processorsHogged(const fs::path& config, const fs::path& programs) {
+FaultOutcome processorsHogged(const fs::path& config, const fs::path& program) {
   BusObserver bus;
   Process hog1("/bin/sh", {"-c", "while :; do :; done"});
   Process hog2("/bin/sh", {"-c", "while :; do :; done"});
-  Pair pair(config, programs);
+  Pair pair(config, program);
   const int status = pair.controller->wait();
   bus.bus.drain();
   // A stop is as good, when its cause is that time ran out.
@@ -158,22 +158,22 @@ FaultOutcome processorsHogged(const fs::path& config, const fs::path& programs) 
 
 }  // namespace
 
-std::vector<FaultRow> processRows(const fs::path& config, const fs::path& programs) {
+std::vector<FaultRow> processRows(const fs::path& config, const fs::path& program) {
   // Another moment at each call, the same ones in each run.
   const auto moments = std::make_shared<std::mt19937>(15);
   return {{"F14", "the machine's process is killed", "controlled stop: sample age", true,
-           [=] { return plantKilled(config, programs); }},
+           [=] { return plantKilled(config, program); }},
           {"F15", "the controller is killed",
            "legs come to rest inside their limits; its successor waits", true,
            [=] {
-             return controllerKilled(config, programs,
+             return controllerKilled(config, program,
                                      5 + static_cast<std::int64_t>((*moments)() % 700));
            }},
           {"F21", "100000 malformed datagrams on the bus",
            "the run goes on or stops, and the legs rest", true,
-           [=] { return malformedFlood(config, programs); }},
+           [=] { return malformedFlood(config, program); }},
           {"F37", "both processors hogged", "the run goes on, or stops for lack of time", true,
-           [=] { return processorsHogged(config, programs); }}};
+           [=] { return processorsHogged(config, program); }}};
 }
 
 }  // namespace ves

@@ -30,6 +30,6 @@ std::vector<FaultRow> operatorRows(const std::filesystem::path& config);
 std::vector<FaultRow> inputRows(const std::filesystem::path& config);
 /// Controller and plant as processes on a bus.
 std::vector<FaultRow> processRows(const std::filesystem::path& config,
-                                  const std::filesystem::path& programs);
+                                  const std::filesystem::path& program);
 
 }  // namespace ves

@@ -21,10 +21,10 @@ bool before(const FaultRow& a, const FaultRow& b) {
 }  // namespace
 
 std::vector<FaultRow> faultTable(const std::filesystem::path& config,
-                                 const std::filesystem::path& programs) {
+                                 const std::filesystem::path& program) {
   std::vector<FaultRow> rows;
   for (auto& part : {scenarioRows(config), operatorRows(config), inputRows(config),
-                     processRows(config, programs)})
+                     processRows(config, program)})
     rows.insert(rows.end(), part.begin(), part.end());
   std::sort(rows.begin(), rows.end(), before);
   return rows;

@@ -50,7 +50,7 @@ Motion commanded(const Series& series) {
 Motion actual(const Series& series) {
   Motion out;
   eachTick(series, [&](const Row& row, double t) {
-    if (!row.has_truth) return;
+    if (!row.hasTruePose()) return;
     out.t.push_back(t);
     out.x.push_back(Vec6::Map(row.truth.x));
   });

@@ -125,7 +125,7 @@ std::vector<Column> columns(const Experiment& experiment) {
   addPose("measured", "", &state_t::x_measured);
   for (int i = 0; i < 6; ++i)
     add(fmt::format("{}_actual_{}", coordinate(i).name, coordinate(i).unit),
-        [=](const Row& r) { return r.has_truth ? r.truth.x[i] : NAN; });
+        [=](const Row& r) { return r.hasTruePose() ? r.truth.x[i] : NAN; });
   addWrench("total", &state_t::total);
   addWrench("static", &state_t::static_wrench);
   addWrench("inertial", &state_t::inertial);

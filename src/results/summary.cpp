@@ -26,7 +26,7 @@ SegmentKind kindOf(const Row& row) { return static_cast<SegmentKind>(row.state.k
 /// Trajectory and admittance segments: what the experiment is about.
 bool measured(const Row& row) {
   const SegmentKind kind = kindOf(row);
-  return running(row) && row.has_truth &&
+  return running(row) && row.hasTruePose() &&
          (kind == SegmentKind::kTrajectory || kind == SegmentKind::kAdmittance ||
           kind == SegmentKind::kPath);
 }

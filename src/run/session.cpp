@@ -36,18 +36,19 @@ Session::Session(const Experiment& experiment, const LaunchOptions& options)
                  [this](const std::string& channel, const void* data, std::uint32_t size) {
                    receive(channel, data, size);
                  });
-  std::vector<std::string> shared = {options.scenario.string(), "--url", process.url};
+  std::vector<std::string> shared = {"plant", options.scenario.string(), "--url", process.url};
   if (process.lockstep) shared.push_back("--lockstep");
   if (process.realtime) shared.push_back("--realtime");
   std::vector<std::string> arguments = shared;
+  arguments.front() = "controller";
   arguments.push_back(process.start ? "--start" : "--no-menu");
   if (process.lockstep && !process.log.empty())
     arguments.insert(arguments.end(), {"--log", process.log});
   if (!process.log.empty())
     arguments.insert(arguments.end(),
                      {"--flight", std::filesystem::path(process.log).parent_path().string()});
-  if (options.plant) plant_ = std::make_unique<Process>(options.programs / "ves-plant", shared);
-  controller_ = std::make_unique<Process>(options.programs / "ves-controller", arguments);
+  if (options.plant) plant_ = std::make_unique<Process>(options.program, shared);
+  controller_ = std::make_unique<Process>(options.program, arguments);
 }
 
 void Session::receive(const std::string& channel, const void* data, std::uint32_t size) {
@@ -80,7 +81,7 @@ bool Session::listen(int milliseconds, int descriptor) {
   bus_.drain();
   if (plant_ && !plant_->running() && controller_->running()) {
     interrupt();
-    throw InputError(fmt::format("ves-plant ended early, status {}", plant_->status()));
+    throw InputError(fmt::format("ves plant ended early, status {}", plant_->status()));
   }
   return descriptor >= 0 && wait[1].revents != 0;
 }
@@ -96,8 +97,10 @@ std::optional<Refusal> Session::order(const Order& order) {
     const std::int64_t repeat = monotonicNow() + kRepeat * 1'000'000LL;
     while (monotonicNow() < repeat && running()) {
       listen(10);
-      if (state_->order_source == self_.source && state_->order_sequence == sequence)
-        return static_cast<Refusal>(state_->refusal);
+      const auto refusal = static_cast<Refusal>(state_->refusal);
+      if (state_->order_source == self_.source && state_->order_sequence == sequence &&
+          refusal != Refusal::kChecking)
+        return refusal;
     }
   }
   return {};
@@ -118,8 +121,8 @@ RunResult Session::result() {
   const int status = controller_->status();
   if (status != 0 && status != 1)
     throw InputError(
-        status < 0 ? fmt::format("ves-controller was ended by signal {}; the legs hold", -status)
-                   : fmt::format("ves-controller ended with status {}", status));
+        status < 0 ? fmt::format("ves controller was ended by signal {}; the legs hold", -status)
+                   : fmt::format("ves controller ended with status {}", status));
   // The last state may be lost on the way; the exit status is not.
   if (status == 0 && result.phase == Phase::kDisarmed) result.let_go = true;
   if (status == 0 && !result.let_go) result.phase = Phase::kParked;

@@ -15,7 +15,10 @@ with a reason in equivalent.txt. Everything else is in build/mutation.
 import argparse
 import collections
 import concurrent.futures
+import dataclasses
+import hashlib
 import json
+import multiprocessing
 import os
 import pathlib
 import random
@@ -40,12 +43,21 @@ ARITHMETIC = {T.BOOL, T.INT, T.UINT, T.LONG, T.ULONG, T.LONGLONG, T.ULONGLONG, T
               T.CHAR_S, T.SCHAR, T.UCHAR, T.DOUBLE, T.FLOAT}
 
 
+@dataclasses.dataclass(frozen=True)
 class Mutant:
-    """One deliberate error: a source range, and what stands there instead."""
+    """One deliberate error: a source range, and what stands there instead.
 
-    def __init__(self, file, start, end, what, build):
-        self.file, self.start, self.end, self.what, self.build = file, start, end, what, build
-        self.id = 0
+    In the form, @ is the mutant's number and each {} one of the source ranges in parts.
+    """
+    file: str  # below SOURCE
+    start: int
+    end: int
+    what: str
+    form: str
+    parts: tuple
+    line: int
+    line_text: str
+    text: str
 
 
 def span(cursor):
@@ -69,9 +81,13 @@ class Finder:
 
     def __init__(self, path, text):
         self.path, self.text, self.found = path, text, []
+        self.name = str(path.relative_to(SOURCE))
+        self.lines = text.splitlines()
 
-    def add(self, start, end, what, build):
-        self.found.append(Mutant(self.path, start, end, what, build))
+    def add(self, start, end, what, form, *parts):
+        line = self.text.count("\n", 0, start) + 1
+        self.found.append(Mutant(self.name, start, end, what, form, parts, line,
+                                 self.lines[line - 1].strip(), self.text[start:end]))
 
     def source(self, a, b):
         return self.text[a:b]
@@ -112,8 +128,7 @@ class Finder:
             call = kind in (K.CALL_EXPR, K.BINARY_OPERATOR, K.COMPOUND_ASSIGNMENT_OPERATOR,
                             K.UNARY_OPERATOR, K.CXX_UNARY_EXPR)
             if call and self.text[b:b + 1] == ";" and "assert" not in text:
-                self.add(a, b, "statement left out",
-                         lambda r, i: f"if (!::ves_m({i})) {r(a, b)}")
+                self.add(a, b, "statement left out", "if (!::ves_m(@)) {}", (a, b))
         if kind == K.IF_STMT:
             self.condition(cursor)
         elif kind in (K.BINARY_OPERATOR, K.COMPOUND_ASSIGNMENT_OPERATOR):
@@ -125,17 +140,14 @@ class Finder:
             inner = next(cursor.get_children(), None)
             if inner is not None and inner.kind not in (K.INTEGER_LITERAL, K.FLOATING_LITERAL):
                 c, d = span(inner)
-                self.add(a, b, "sign dropped",
-                         lambda r, i: f"(::ves_m({i}) ? ({r(c, d)}) : -({r(c, d)}))")
-        elif kind == K.CALL_EXPR and cursor.spelling == "operator-" and text.startswith("-"):
-            pass
+                self.add(a, b, "sign dropped", "(::ves_m(@) ? ({}) : -({}))", (c, d), (c, d))
         elif kind in (K.FLOATING_LITERAL, K.INTEGER_LITERAL):
             self.literal(a, b, text)
         elif kind == K.CONDITIONAL_OPERATOR:
             parts = list(cursor.get_children())
             if len(parts) == 3:
                 (a0, b0), (a1, b1), (a2, b2) = map(span, parts)
-                self.add(a0, b0, "choice swapped", lambda r, i: f"(::ves_m({i}) != ({r(a0, b0)}))")
+                self.add(a0, b0, "choice swapped", "(::ves_m(@) != ({}))", (a0, b0))
         elif kind == K.CALL_EXPR and cursor.spelling in ("min", "max", "sin", "cos", "abs"):
             self.function(cursor, a, b)
 
@@ -146,7 +158,7 @@ class Finder:
             return
         if canonical(parts[0]).kind != T.BOOL:
             return
-        self.add(a, b, "condition never true", lambda r, i: f"(!::ves_m({i}) && ({r(a, b)}))")
+        self.add(a, b, "condition never true", "(!::ves_m(@) && ({}))", (a, b))
 
     def operator(self, cursor, a, b):
         parts = list(cursor.get_children())
@@ -156,38 +168,37 @@ class Finder:
         between = self.source(b0, a1).strip()
         left, right = parts
 
-        def ternary(other):
-            return lambda r, i: (f"(::ves_m({i}) ? ({r(a0, b0)}) {other} ({r(a1, b1)})"
-                                 f" : ({r(a0, b0)}) {between} ({r(a1, b1)}))")
+        sides = (a0, b0), (a1, b1), (a0, b0), (a1, b1)
+
+        def choice(other):
+            return f"(::ves_m(@) ? ({{}}) {other} ({{}}) : ({{}}) {between} ({{}}))"
         if between in RELATIONS:
-            self.add(a, b, f"{between} to {RELATIONS[between]}", ternary(RELATIONS[between]))
+            self.add(a, b, f"{between} to {RELATIONS[between]}", choice(RELATIONS[between]), *sides)
         elif between in ("&&", "||"):
-            side = self.path.name and random.Random(a).random() < 0.5
+            side = random.Random(a).random() < 0.5
             other = "true" if between == "&&" else "false"
             keep = (a0, b0) if side else (a1, b1)
             what = f"{'right' if side else 'left'} side of {between} dropped"
-            self.add(a, b, what,
-                     lambda r, i: (f"(::ves_m({i}) ? bool({r(*keep)}) : ({r(a0, b0)}) {between} "
-                                   f"({r(a1, b1)}))"))
+            self.add(a, b, what, f"(::ves_m(@) ? bool({{}}) : ({{}}) {between} ({{}}))", keep,
+                     *sides[2:])
         elif between in ("+", "-") and is_number(left) and is_number(right):
             other = "-" if between == "+" else "+"
-            self.add(a, b, f"{between} to {other}", ternary(other))
+            self.add(a, b, f"{between} to {other}", choice(other), *sides)
             self.add(a, b, f"term after {between} dropped",
-                     lambda r, i: (f"(::ves_m({i}) ? ({r(a0, b0)}) + 0 * ({r(a1, b1)}) : "
-                                   f"({r(a0, b0)}) {between} ({r(a1, b1)}))"))
+                     f"(::ves_m(@) ? ({{}}) + 0 * ({{}}) : ({{}}) {between} ({{}}))", *sides)
         elif between in ("*", "/") and is_number(left) and is_number(right):
             other = "/" if between == "*" else "*"
-            self.add(a, b, f"{between} to {other}", ternary(other))
+            self.add(a, b, f"{between} to {other}", choice(other), *sides)
         elif between in ("+=", "-=") and is_number(left) and is_number(right):
             other = "-=" if between == "+=" else "+="
-            self.add(a, b, f"{between} to {other}", ternary(other))
+            self.add(a, b, f"{between} to {other}", choice(other), *sides)
 
     def overloaded(self, cursor, a, b):
         arguments = list(cursor.get_arguments())
         if len(arguments) == 1 and cursor.spelling == "operator-":
             c, d = span(arguments[0])
             if is_eigen(arguments[0]) and c > a:
-                self.add(a, b, "sign dropped", lambda r, i: f"(::ves_f({i}, -1.0) * -({r(c, d)}))")
+                self.add(a, b, "sign dropped", "(::ves_f(@, -1.0) * -({}))", (c, d))
             return
         if len(arguments) != 2:
             return
@@ -198,12 +209,11 @@ class Finder:
         if is_eigen(arguments[1]):
             for what, factor in ((f"{symbol} reversed", "-1.0"),
                                  (f"term after {symbol} dropped", "0.0")):
-                self.add(a1, b1, what,
-                         lambda r, i, f=factor: f"(::ves_f({i}, {f}) * ({r(a1, b1)}))")
+                self.add(a1, b1, what, f"(::ves_f(@, {factor}) * ({{}}))", (a1, b1))
         elif symbol in ("+", "-"):
             self.add(a, b, f"term after {symbol} dropped",
-                     lambda r, i: (f"(::ves_m({i}) ? ({r(a0, b0)}) : ({r(a0, b0)}) {symbol} "
-                                   f"({r(a1, b1)}))"))
+                     f"(::ves_m(@) ? ({{}}) : ({{}}) {symbol} ({{}}))",
+                     (a0, b0), (a0, b0), (a1, b1))
 
     def literal(self, a, b, text):
         before, after = self.text[a - 1:a], self.text[b:b + 1]
@@ -212,10 +222,10 @@ class Finder:
         if re.fullmatch(r"[0-9']+\.[0-9e']*|[0-9]+e-?[0-9]+|[0-9.]+e-?[0-9]+", text):
             zero = float(text.replace("'", "")) == 0.0
             other = "1.0" if zero else f"1.25 * {text}"
-            self.add(a, b, f"{text} to {other}", lambda r, i: f"(::ves_m({i}) ? {other} : {text})")
+            self.add(a, b, f"{text} to {other}", f"(::ves_m(@) ? {other} : {text})")
         elif re.fullmatch(r"[0-9]+", text):
             self.add(a, b, f"{text} to {int(text) + 1}",
-                     lambda r, i: f"(::ves_m({i}) ? {int(text) + 1} : {text})")
+                     f"(::ves_m(@) ? {int(text) + 1} : {text})")
 
     def function(self, cursor, a, b):
         text = self.source(a, b)
@@ -228,13 +238,12 @@ class Finder:
         if "{" in self.text[a:inner[0] + 1]:
             return
         if name == "abs":
-            self.add(a, b, "abs dropped",
-                     lambda r, i: f"(::ves_m({i}) ? ({r(*inner)}) : std::abs({r(*inner)}))")
+            self.add(a, b, "abs dropped", "(::ves_m(@) ? ({}) : std::abs({}))", inner, inner)
         else:
             head = m.group(0)
             other = head.replace("::" + name, "::" + swap[name])
             self.add(a, b, f"{name} to {swap[name]}",
-                     lambda r, i: f"(::ves_m({i}) ? {other}{r(*inner)}) : {head}{r(*inner)}))")
+                     f"(::ves_m(@) ? {other}{{}}) : {head}{{}}))", inner, inner)
 
 
 def sources(module):
@@ -242,40 +251,46 @@ def sources(module):
     return sorted((SOURCE / "src" / module).glob("*.cpp")) + headers
 
 
-def find_all():
+def find(path):
+    """All mutants of one source file."""
     flags = ["-xc++", "-std=c++20", f"-I{SOURCE}/include", "-I/usr/include/eigen3",
              "-isystem", "/usr/lib/llvm-14/lib/clang/14.0.6/include"]
-    index = ci.Index.create()
-    out = {}
-    for module in MODULES:
-        out[module] = []
-        for path in sources(module):
-            text = path.read_text()
-            unit = index.parse(str(path), args=flags)
-            fatal = [d for d in unit.diagnostics if d.severity >= 3]
-            if fatal:
-                sys.exit(f"{path}: {fatal[0].spelling}")
-            finder = Finder(path, text)
-            for child in unit.cursor.get_children():
-                finder.visit(child, None)
-            seen = set()
-            for m in finder.found:
-                key = (m.start, m.end, m.what)
-                if key not in seen:
-                    seen.add(key)
-                    out[module].append(m)
+    unit = ci.Index.create().parse(str(path), args=flags)
+    fatal = [d for d in unit.diagnostics if d.severity >= 3]
+    if fatal:
+        sys.exit(f"{path}: {fatal[0].spelling}")
+    finder = Finder(path, path.read_text())
+    for child in unit.cursor.get_children():
+        finder.visit(child, None)
+    return list({(m.start, m.end, m.what): m for m in finder.found}.values())
+
+
+def find_all():
+    paths = [(module, path) for module in MODULES for path in sources(module)]
+    with multiprocessing.Pool() as pool:
+        found = pool.map(find, [path for _, path in paths], chunksize=1)
+    out = {module: [] for module in MODULES}
+    for (module, _), mutants in zip(paths, found):
+        out[module] += mutants
     return out
 
 
 def draw(found, count, seed):
-    """So many mutants in all, by the modules' shares; never two at exactly one place."""
+    """So many mutants in all, by the modules' shares; never two at exactly one place.
+
+    A mutant's lot depends on its own line alone: an edit elsewhere does not draw anew.
+    """
     total = sum(len(v) for v in found.values())
     chosen = []
     for module, mutants in found.items():
-        rng = random.Random(f"{seed}/{module}")
-        rng.shuffle(mutants)
-        wanted, taken = max(20, round(count * len(mutants) / total)), set()
+        met = collections.Counter()
+        lots = []
         for m in mutants:
+            key = f"{seed} {m.file} {m.line_text} {m.text} {m.what}"
+            met[key] += 1
+            lots.append((hashlib.sha256(f"{key} {met[key]}".encode()).digest(), m))
+        wanted, taken = max(20, round(count * len(mutants) / total)), set()
+        for _, m in sorted(lots, key=lambda lot: lot[0]):
             if wanted and (m.file, m.start, m.end) not in taken:
                 taken.add((m.file, m.start, m.end))
                 chosen.append((module, m))
@@ -286,17 +301,19 @@ def draw(found, count, seed):
 def render(text, mutants):
     """The text with every mutant of it, inner ones inside outer ones."""
     def range_(lo, hi, skip):
-        inside = [m for m in mutants if lo <= m.start and m.end <= hi and m not in skip]
+        inside = [m for m in mutants if lo <= m["start"] and m["end"] <= hi and m["id"] not in skip]
         outer = [m for m in inside if not any(
-            o is not m and o.start <= m.start and m.end <= o.end for o in inside)]
+            o is not m and o["start"] <= m["start"] and m["end"] <= o["end"] for o in inside)]
         result, at = [], lo
-        for m in sorted(outer, key=lambda x: x.start):
-            if m.start < at:
+        for m in sorted(outer, key=lambda x: x["start"]):
+            if m["start"] < at:
                 continue  # overlaps another without being inside it
-            result.append(text[at:m.start])
-            nested = skip | {m}
-            result.append(m.build(lambda a, b: range_(a, b, nested), m.id))
-            at = m.end
+            result.append(text[at:m["start"]])
+            pieces = m["form"].replace("@", str(m["id"])).split("{}")
+            result.append(pieces[0])
+            for (a, b), piece in zip(m["parts"], pieces[1:]):
+                result += [range_(a, b, skip | {m["id"]}), piece]
+            at = m["end"]
         result.append(text[at:hi])
         return "".join(result)
     return range_(0, len(text), frozenset())
@@ -331,26 +348,19 @@ def generate(args):
     WORK.mkdir(parents=True, exist_ok=True)
     snapshot()
     chosen = draw(find_all(), args.count, args.seed)
-    records = []
-    for number, (module, m) in enumerate(chosen, start=1):
-        m.id = number
-        text = m.file.read_text()
-        line = text.count("\n", 0, m.start) + 1
-        records.append({"id": number, "module": module, "file": str(m.file.relative_to(SOURCE)),
-                        "line": line, "what": m.what, "text": text[m.start:m.end],
-                        "line_text": text.splitlines()[line - 1].strip()})
+    records = [{"id": number, "module": module, **dataclasses.asdict(m)}
+               for number, (module, m) in enumerate(chosen, start=1)]
     (WORK / "mutants.json").write_text(json.dumps(records, indent=1))
     (WORK / "dropped.json").write_text("[]")
-    write_tree(chosen, set())
+    write_tree(records, set())
     print(f"{len(records)} mutants")
 
 
-def write_tree(chosen, dropped):
+def write_tree(records, dropped):
     by_file = collections.defaultdict(list)
-    for number, (_, m) in enumerate(chosen, start=1):
-        m.id = number
-        if number not in dropped:
-            by_file[m.file].append(m)
+    for m in records:
+        if m["id"] not in dropped:
+            by_file[SOURCE / m["file"]].append(m)
     for source in SOURCE.rglob("*"):
         if source.is_file():
             content = source.read_bytes()
@@ -362,11 +372,11 @@ def write_tree(chosen, dropped):
             put(TREE / source.relative_to(SOURCE), content, source)
 
 
-def build(args):
-    flags = "-O1 -w"
+def build(_):
+    flags = "-O1 -w -D_GLIBCXX_ASSERTIONS"  # with assert(): an index past the end is noticed
     configure = ["cmake", "-S", str(TREE), "-B", str(BUILD), "-G", "Ninja",
                  "-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_CXX_FLAGS_RELEASE=" + flags]
-    chosen = draw(find_all(), args.count, args.seed)
+    records = json.loads((WORK / "mutants.json").read_text())
     dropped = set(json.loads((WORK / "dropped.json").read_text()))
     for _ in range(8):
         subprocess.run(configure, check=True, stdout=subprocess.DEVNULL)
@@ -385,7 +395,7 @@ def build(args):
             sys.exit("the mutated tree does not build")
         dropped |= bad
         (WORK / "dropped.json").write_text(json.dumps(sorted(dropped)))
-        write_tree(chosen, dropped)
+        write_tree(records, dropped)
     sys.exit("too many mutants are not C++")
 
 
@@ -394,9 +404,18 @@ def environment(**more):
             "GTEST_BRIEF": "1", **more}
 
 
+FAULTS = "Faults.Table"  # the one test of ctest that is no gtest
+
+
+def command(binary, names):
+    if binary == FAULTS:
+        return [BUILD / "apps" / "ves", "faults", "--lockstep"]
+    return [BUILD / "tests" / binary, "--gtest_filter=" + ":".join(names)]
+
+
 def all_tests():
     """[binary, test] of everything that ctest would run, live processes left out."""
-    out = []
+    out = [(FAULTS, FAULTS)]
     for binary in sorted((BUILD / "tests").glob("*_test")):
         if binary.name in ("programs_test", "console_test", "doctor_test", "layering_test"):
             continue
@@ -417,7 +436,7 @@ def cover(test):
     file = WORK / "coverage" / f"{abs(hash(test))}"
     file.unlink(missing_ok=True)
     start = time.monotonic()
-    done = subprocess.run([BUILD / "tests" / binary, f"--gtest_filter={name}"],
+    done = subprocess.run(command(binary, [name]),
                           env=environment(VES_MUTANT_COVERAGE=str(file)), cwd=BUILD / "tests",
                           stdin=subprocess.DEVNULL, capture_output=True, text=True)
     seconds = time.monotonic() - start
@@ -450,7 +469,7 @@ def attack(record, tests):
         allowed = 10.0 + 6.0 * sum(t["seconds"] for t in some)
         try:
             done = subprocess.run(
-                [BUILD / "tests" / binary, "--gtest_filter=" + ":".join(t["name"] for t in some)],
+                command(binary, [t["name"] for t in some]),
                 env=environment(VES_MUTANT=str(record["id"])), cwd=BUILD / "tests",
                 stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace",
                 timeout=allowed)

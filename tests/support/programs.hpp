@@ -51,7 +51,7 @@ class Programs : public testing::Test {
   void TearDown() override { fs::remove_all(folder_); }
 
   static std::string app(const std::string& name) {
-    return std::string(VES_TEST_APP_DIR) + "/ves-" + name + " ";
+    return std::string(VES_TEST_APP_DIR) + "/ves " + name + " ";
   }
   Output run(const std::string& arguments) { return sh(app("run") + arguments); }
   std::string out(const std::string& name) { return " --out " + (folder_ / name).string() + " "; }
@@ -64,7 +64,8 @@ class Programs : public testing::Test {
   static Process start(const std::string& name, std::vector<std::string> arguments) {
     if (name == "controller")
       arguments.insert(arguments.end(), patience().begin(), patience().end());
-    return {std::string(VES_TEST_APP_DIR) + "/ves-" + name, arguments};
+    arguments.insert(arguments.begin(), name);
+    return {std::string(VES_TEST_APP_DIR) + "/ves", arguments};
   }
   /// Commands of a log, in order.
   static std::vector<std::array<std::int32_t, 8>> commands(const fs::path& folder) {

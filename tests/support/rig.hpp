@@ -38,6 +38,11 @@ inline Segment sine(int coordinate, double amplitude, double frequency, double d
   return s;
 }
 
+/// Parked, or stopped by a check.
+inline bool done(const TickState& s) {
+  return s.phase == Phase::kParked || s.phase == Phase::kStopped;
+}
+
 /// Controller and plant in lockstep, an operator beside them.
 class Rig {
  public:
@@ -45,6 +50,11 @@ class Rig {
 
   const TickState& tick(Request request = Request::kNone, const Segment& s = {}) {
     return loop_.step({request, s, {}});
+  }
+  /// The same until it is answered: a path is gone through first.
+  const TickState& order(Request request, const Segment& s = {}) {
+    for (tick(request, s); state().refusal == Refusal::kChecking;) tick();
+    return state();
   }
   const TickState& run(int ticks) {
     for (int i = 0; i < ticks; ++i) tick();

@@ -29,13 +29,62 @@ struct ModalHold {
 /// Over dt [s], for damping of any form.
 ModalHold modalHold(const ModalModel& model, double dt);
 
+/// A modal model whose transitions over fixed lengths of time are computed beforehand: mode by mode
+/// (D.5), or, when damping couples the modes, all of them in one state space.
+class ModalDynamics {
+ public:
+  template <int Max>
+  using Vector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, Max, 1>;
+  using Forces = Vector<kMaxModes>;  // modal: Phi^T F
+  static constexpr int kCoupledStates = 2 * kMaxCoupledModes;
+  using Square =
+      Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kCoupledStates, kCoupledStates>;
+
+  struct Modes {
+    Vector<kMaxModes> eta, eta_dot;
+  };
+  /// Exact over one length of time.
+  struct Hold {
+    Eigen::Array<double, 6, Eigen::Dynamic, 0, 6, kMaxModes> modes;  // a mode's Phi (4), Gamma (2)
+    Square Phi, Gamma;                                               // when coupled
+  };
+
+  /// Requires at most kMaxModes modes, kMaxCoupledModes if coupled.
+  explicit ModalDynamics(const ModalModel& model);
+
+  /// Over dt [s], which may be negative.
+  Hold hold(double dt) const;
+  /// From `from`, `u` held.
+  Modes advance(const Hold& hold, const Modes& from, const Forces& u) const noexcept;
+  /// (C.7): eta'' under u.
+  Vector<kMaxModes> acceleration(const Modes& modes, const Forces& u) const noexcept;
+  /// Phi Gamma_2 Phi^T: the base's rate after the hold, per wrench.
+  Mat6 ratePerWrench(const Hold& hold) const;
+  /// The largest damping that concerns mode i [1/s]; the whole matrix's when it couples.
+  double damping(Eigen::Index i) const { return coupled_ ? damping_.norm() : c_(i); }
+
+  Modes atRest() const;
+  /// [J] the modes are mass-normalised.
+  double potentialEnergy(const Modes& m) const noexcept { return 0.5 * k_.dot(m.eta.cwiseAbs2()); }
+  const auto& Phi() const noexcept { return Phi_; }      // 6 x k
+  const auto& stiffness() const noexcept { return k_; }  // k, [1/s^2]
+  bool coupled() const noexcept { return coupled_; }
+  Eigen::Index size() const noexcept { return k_.size(); }
+
+ private:
+  Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, kMaxModes> Phi_;
+  Vector<kMaxModes> k_;  // [1/s^2]
+  Vector<kMaxModes> c_;  // [1/s] diagonal of the damping
+  bool coupled_ = false;
+  Square damping_;  // when coupled
+};
+
 /// Steps a modal model by the exact zero-order hold. Coordinates are those of Pose about home,
 /// taken as small: the wrench's moments drive the fixed angles directly, as in (C.2).
 class AdmittanceModel {
  public:
-  /// Discretises for the period [s]: mode by mode (D.5), or, when damping couples the modes, all
-  /// of them in one state space. Requires at most kMaxModes modes, kMaxCoupledModes if coupled.
-  /// `ahead` [s]: motion() is so much later than the step's end, the wrench held.
+  /// Discretises for the period [s]. `ahead` [s]: motion() is so much later than the step's end,
+  /// the wrench held.
   AdmittanceModel(const ModalModel& model, double period, double ahead = 0.0);
 
   /// At rest at x. What the modes cannot express of x stays as a constant offset. With `ahead` it
@@ -58,51 +107,33 @@ class AdmittanceModel {
   void slow(double share) noexcept;
 
   /// [J] the modes are mass-normalised.
-  double kineticEnergy() const noexcept { return 0.5 * now_.eta_dot.squaredNorm(); }
-  double energy() const noexcept { return kineticEnergy() + 0.5 * k_.dot(now_.eta.cwiseAbs2()); }
+  double kineticEnergy() const noexcept { return 0.5 * now_.modes.eta_dot.squaredNorm(); }
+  double energy() const noexcept { return kineticEnergy() + dynamics_.potentialEnergy(now_.modes); }
 
   /// (C.7): position, velocity, acceleration at the last step's end.
-  const PathPoint<6>& motion() const noexcept { return motion_; }
+  const PathPoint<6>& motion() const noexcept { return now_.motion; }
 
-  int modes() const noexcept { return static_cast<int>(k_.size()); }
+  int modes() const noexcept { return static_cast<int>(dynamics_.size()); }
 
  private:
-  template <int Max>
-  using Vector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, Max, 1>;
-  template <int Rows, int MaxRows, int MaxCols>
-  using Matrix = Eigen::Matrix<double, Rows, Eigen::Dynamic, 0, MaxRows, MaxCols>;
-  static constexpr int kCoupledStates = 2 * kMaxCoupledModes;
-  using Square =
-      Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kCoupledStates, kCoupledStates>;
+  using Modes = ModalDynamics::Modes;
+  using Hold = ModalDynamics::Hold;
+  struct State {
+    Modes modes;
+    PathPoint<6> motion;  // with the share of `ahead`
+  };
 
-  /// Exact over one length of time.
-  struct Hold {
-    Eigen::Array<double, 6, Eigen::Dynamic, 0, 6, kMaxModes> modes;  // a mode's Phi (4), Gamma (2)
-    Square Phi, Gamma;                                               // when coupled
-  };
-  Hold hold(const ModalModel& model, double dt) const;
-  struct Modes {
-    Vector<kMaxModes> eta, eta_dot;
-  };
-  /// From `from`, `u` held.
-  Modes advance(const Hold& hold, const Modes& from, const Vector<kMaxModes>& u) const noexcept;
   /// (C.7).
-  PathPoint<6> at(const Modes& modes, const Vector<kMaxModes>& u) const noexcept;
+  PathPoint<6> at(const Modes& modes, const ModalDynamics::Forces& u) const noexcept;
 
-  Matrix<6, 6, kMaxModes> Phi_;
+  ModalDynamics dynamics_;
   Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::RowMajor, kMaxModes, 6> Phi_pinv_;
-  Vector<kMaxModes> k_;  // [1/s^2]
-  Vector<kMaxModes> c_;  // [1/s] diagonal of the damping
   double period_ = 0.0;  // [s]
   double ahead_ = 0.0;   // [s]
-  bool coupled_ = false;
-  Square damping_;  // when coupled
   Hold step_, ahead_hold_, back_;
-  Mat6 rate_per_wrench_;  // Phi Gamma_2 Phi^T
-  Modes now_, before_;    // before the last step
-  PathPoint<6> motion_before_;
+  Mat6 rate_per_wrench_;
+  State now_, before_;  // before the last step
   Vec6 offset_ = Vec6::Zero();
-  PathPoint<6> motion_;
 };
 
 }  // namespace ves

@@ -53,12 +53,28 @@ class MotionPlan {
   Vec6 start_ = Vec6::Zero();
 };
 
-/// Goes through a move or a trajectory before it begins: the path checks at up to kPathSamples
-/// poses, and those of a step from each to the next. `L` [m] is where the legs are. Returns the
-/// first check that would fail; kCount when none would.
-Check firstFailure(const MotionPlan& plan, const PathChecks& checks, const Vec6& L, double period,
-                   const RecordedPath& path) noexcept;
+/// Goes through a move or a trajectory before it begins, some poses a tick: the path checks at up
+/// to kPoses poses, and those of a step from each to the next.
+class Rehearsal {
+ public:
+  static constexpr std::int64_t kPoses = 1000;      // [-]
+  static constexpr std::int64_t kPosesATick = 100;  // [-]
 
-inline constexpr std::int64_t kPathSamples = 1000;  // [-]
+  /// `L` [m] is where the legs are.
+  void begin(const MotionPlan& plan, const Vec6& L) noexcept;
+  void cancel() noexcept { under_way_ = false; }
+  bool underWay() const noexcept { return under_way_; }
+  /// The next kPosesATick poses.
+  void advance(const PathChecks& checks, double period, const RecordedPath& path) noexcept;
+  /// The first check that would fail; kCount when none would.
+  Check failure() const noexcept { return failure_; }
+
+ private:
+  MotionPlan plan_;
+  std::int64_t n_ = 0;  // [-] periods of the plan so far
+  Vec6 L_last_ = Vec6::Zero();
+  Check failure_ = Check::kCount;
+  bool under_way_ = false;
+};
 
 }  // namespace ves

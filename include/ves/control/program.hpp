@@ -74,6 +74,7 @@ enum class Refusal : std::int32_t {
   kUnstable,        // admittance control with this base and robot would diverge
   kNoCompensation,  // the configuration has none
   kUnassessed,      // the stability of this loop was not checked
+  kChecking,        // not refused yet: its path is being checked, over some ticks
   kCount
 };
 

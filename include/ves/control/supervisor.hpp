@@ -66,6 +66,7 @@ class Supervisor {
   Refusal obey(const Order& order, const Situation& now, Actuation act) noexcept;
   Refusal arm(Request request, const Situation& now, Actuation act) noexcept;
   Refusal run(const Segment& segment, const Situation& now, Actuation act) noexcept;
+  void rehearse(const Situation& now, Actuation act) noexcept;
   Refusal compensate(bool in, const Situation& now, Actuation act) noexcept;
   Refusal reset(Actuation act) noexcept;
   Refusal refusesAdmittance(const Situation& now, Actuation act) const noexcept;
@@ -83,13 +84,15 @@ class Supervisor {
   Request pending_request_ = Request::kNone;  // kStart or kArm, once the stream is fresh
   bool operator_present_ = false;             // somebody gives orders: hold after what is over
   bool aborted_ = false;                      // the program: a calibration or a start was refused
-  OrderId order_;                             // the last one given
+  OrderId order_;                             // the last one given, or answered
   Refusal refusal_ = Refusal::kNone;          // of it
   Check refused_by_ = Check::kCount;          // of a path that was refused
-  Tripped tripped_;                           // in the last tick
-  Tripped latched_;                           // since the start
-  Check cause_ = Check::kCount;               // the first to latch
-  std::int64_t cause_tick_ = -1;              // [-]
+  Order rehearsed_;                           // the order whose path is being checked
+  Rehearsal rehearsal_;
+  Tripped tripped_;               // in the last tick
+  Tripped latched_;               // since the start
+  Check cause_ = Check::kCount;   // the first to latch
+  std::int64_t cause_tick_ = -1;  // [-]
 };
 
 }  // namespace ves

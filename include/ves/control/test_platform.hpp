@@ -35,11 +35,6 @@ class TestPlatform {
   /// One period. Bounded, and free of heap, locks, clocks, logs and exceptions.
   const TickState& tick(const TickInput& in) noexcept;
 
-  /// Parked, or stopped by a check.
-  bool done() const noexcept {
-    return supervisor_.phase() == Phase::kParked || supervisor_.stopped();
-  }
-
  private:
   /// F_Po_I of one tick.
   struct Wrenches {

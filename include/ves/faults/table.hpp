@@ -28,10 +28,10 @@ struct FaultRow {
   std::function<FaultOutcome()> run;
 };
 
-/// `config` is the folder with faults.yaml and the scenarios, `programs` that of ves-controller and
-/// ves-plant. Rows with processes need a bus: enterPrivateBus() first. Throws InputError where
-/// faults.yaml is wrong.
+/// `config` is the folder with faults.yaml and the scenarios; `program` is `ves`, which is the
+/// controller and the plant of rows with processes. Those need a bus: enterPrivateBus() first.
+/// Throws InputError where faults.yaml is wrong.
 std::vector<FaultRow> faultTable(const std::filesystem::path& config,
-                                 const std::filesystem::path& programs);
+                                 const std::filesystem::path& program);
 
 }  // namespace ves

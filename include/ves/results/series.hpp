@@ -21,6 +21,8 @@ struct Row {
   state_t state;
   truth_t truth;
   bool has_truth = false;
+  /// The true leg lengths fitted a pose.
+  bool hasTruePose() const { return has_truth && truth.legs_agree; }
   sample_t sample;
   bool has_sample = false;
   timing_t timing;

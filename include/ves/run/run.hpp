@@ -58,7 +58,7 @@ void runPlant(const Experiment& experiment, const ProcessOptions& options,
 
 struct LaunchOptions {
   ProcessOptions process;
-  std::filesystem::path programs;  // folder of ves-controller and ves-plant
+  std::filesystem::path program;  // `ves`, which is controller and plant too
   std::filesystem::path scenario;  // resolved experiment file, for both
   bool plant = true;               // ours too; else one is on the bus
 };

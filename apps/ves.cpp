@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// ves: every command of the project in one program.
+#include <string_view>
+
+#include "app.hpp"
+#include "commands.hpp"
+#include "ves/base/build.hpp"
+
+namespace ves::app {
+namespace {
+
+struct Command {
+  const char* name;
+  const char* purpose;
+  int (*run)(int argc, char** argv);
+};
+
+constexpr Command kCommands[] = {
+    {"demo", "watch it move: PUMA 560 on a compliant base, two processes, 20 s", demoCommand},
+    {"run", "run one scenario of config/scenarios (--lockstep: as fast as possible)", runCommand},
+    {"controller", "testPlatform, with its menu on a terminal", controllerCommand},
+    {"plant", "the machine as a process, by hand", plantCommand},
+    {"replay", "a recorded run through the controller again (--check: bit for bit)", replayCommand},
+    {"collect", "variables of a log as CSV (--select, --rate, --list)", collectCommand},
+    {"report", "chapter 4 of the report once more, as one page", reportCommand},
+    {"srms", "the flexible base, and the robot on it (chapter 3)", srmsCommand},
+    {"stability", "whether the force feedback decays: this machine's, Appendix E's",
+     stabilityCommand},
+    {"identify", "the robot's masses and the legs' servos from logs", identifyCommand},
+    {"sweep", "one scenario over many values, on all cores, one row a run", sweepCommand},
+    {"faults", "inject the faults of the table, say what was expected and what happened",
+     faultsCommand},
+    {"doctor", "can this machine keep the loop's time, and what to do where it cannot",
+     doctorCommand},
+};
+
+int call(const Command& command, std::string option) {
+  std::string name = command.name;
+  char* argv[] = {name.data(), option.data(), nullptr};
+  return command.run(2, argv);
+}
+
+/// For bash: eval "$(ves completion)".
+void printCompletion() {
+  fmt::print(
+      "_ves() {{\n  local words cur=${{COMP_WORDS[COMP_CWORD]}} command=${{COMP_WORDS[1]}}\n"
+      "  if ((COMP_CWORD == 1)); then\n    words='");
+  for (const Command& c : kCommands) fmt::print("{} ", c.name);
+  fmt::print("test fuzz bench help'\n  else\n    case $command in\n");
+  for (const Command& c : kCommands) {
+    fmt::print("      {}) words='", c.name);
+    std::fflush(stdout);
+    call(c, kWords);
+    fmt::print("' ;;\n");
+  }
+  fmt::print(
+      "    esac\n"
+      "    case $command in run | controller | plant | sweep | stability | identify | srms)\n"
+      "      words+=\" $(cd \"${{VES_CONFIG_DIR-config}}/scenarios\" 2>/dev/null && "
+      "printf '%s ' *.yaml | sed 's/\\.yaml//g')\" ;;\n"
+      "    esac\n"
+      "  fi\n  COMPREPLY=($(compgen -W \"$words\" -- \"$cur\"))\n"
+      "  [[ $cur == -* ]] || COMPREPLY+=($(compgen -f -- \"$cur\"))\n}}\n"
+      "complete -F _ves ves ./ves\n");
+}
+
+/// The manual page, for man -l -.
+void printManual() {
+  fmt::print(
+      ".TH VES 1 \"\" \"{}\" \"Vehicle Emulation System\"\n.SH NAME\n"
+      "ves \\- a Stewart platform that moves as a flexible arm under a robot would\n"
+      ".SH SYNOPSIS\n.B ves\n.I COMMAND\n.RI [ ARGUMENT ...]\n.SH COMMANDS\n",
+      describeBuild());
+  for (const Command& c : kCommands) {
+    fmt::print(".SS {}\n.nf\n", c.name);
+    std::fflush(stdout);
+    call(c, "--help");
+    fmt::print(".fi\n");
+  }
+  fmt::print(
+      ".SH EXIT STATUS\n0: done. 1: a check stopped the run, or a comparison failed. 2: bad "
+      "input, in one line.\n.SH ENVIRONMENT\nVES_CONFIG_DIR: the folder of bases, robots and "
+      "scenarios.\n");
+}
+
+void printUsage(FILE* to) {
+  fmt::print(to, "usage: ves COMMAND [ARGUMENT...]\n\n");
+  for (const Command& c : kCommands) fmt::print(to, "  {:<12}{}\n", c.name, c.purpose);
+  fmt::print(to,
+             "  {:<12}{}\n  {:<12}{}\n\n`ves COMMAND --help` tells the rest; --version: which "
+             "build this is.\n",
+             "completion", "for bash: eval \"$(./ves completion)\"", "man",
+             "the manual page: ./ves man | man -l -");
+}
+
+int dispatch(int argc, char** argv) {
+  const std::string_view word = argc > 1 ? argv[1] : "";
+  for (const Command& c : kCommands)
+    if (word == c.name) return c.run(argc - 1, argv + 1);
+  if (word == "--version") {
+    fmt::print("ves {}\n", describeBuild());
+  } else if (word == "completion") {
+    printCompletion();
+  } else if (word == "man") {
+    printManual();
+  } else if (word == "help" || word == "--help" || word == "-h") {
+    printUsage(stdout);
+  } else {
+    printUsage(stderr);
+    if (!word.empty()) fmt::print(stderr, "\nves: unknown command '{}'\n", word);
+    return kBadInput;
+  }
+  return kDone;
+}
+
+}  // namespace
+}  // namespace ves::app
+
+int main(int argc, char** argv) { return ves::app::dispatch(argc, argv); }

@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// The stability check of a scenario: what it bars, what it names, and which cures it offers.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "support/rig.hpp"
+#include "ves/analysis/gate.hpp"
+#include "ves/analysis/loop.hpp"
+#include "ves/run/run.hpp"
+#include "ves/srms/modes.hpp"
+
+namespace ves {
+namespace {
+
+const std::vector<std::string> kDiverging = {"base.keep_modes=6", "legs.filters=outputs"};
+
+TEST(Gate, NamesWhatGrowsAndWhatItNamesCuresIt) {
+  const Experiment e = test::experiment("srms_deploy_doss", kDiverging);
+  const LoopVerdict v = assessStability(e.controller, e.plant);
+  ASSERT_FALSE(v.stable);
+  EXPECT_GT(v.worst.growth, 0.0);
+  const std::string said = explain(v);
+  EXPECT_NE(said.find("keep 3 of the 6 modes"), std::string::npos) << said;
+  EXPECT_NE(said.find(" Hz, most in "), std::string::npos) << said;
+  const auto with = [](const std::string& set) {
+    std::vector<std::string> all = kDiverging;
+    all.push_back(set);
+    const Experiment cured = test::experiment("srms_deploy_doss", all);
+    return assessStability(cured.controller, cured.plant, false).stable;
+  };
+  EXPECT_TRUE(with("base.keep_modes=" + std::to_string(v.stable_modes)));
+  EXPECT_FALSE(with("base.keep_modes=" + std::to_string(v.stable_modes + 1)));
+  EXPECT_TRUE(with("base.arm.damping_ratio=" + std::to_string(v.damping_ratio)));
+}
+
+TEST(Gate, LooksAtEveryPoseOfTheRobot) {
+  // A base so light that the folded robot is just borne; unfolding its elbow, as its program does,
+  // is too much.
+  const auto stable = [](double lighter, const std::string& robot) {
+    Experiment e = test::experiment("doss_on_table_4_1",
+                                    {"program=[{admittance: {duration_s: 5}" + robot + "}]"});
+    e.controller.admittance.Phi *= lighter;
+    return assessStability(e.controller, e.plant, false).stable;
+  };
+  double lo = 1.0, hi = 100.0;
+  ASSERT_TRUE(stable(lo, ""));
+  ASSERT_FALSE(stable(hi, ""));
+  for (int i = 0; i < 14; ++i) {
+    const double mid = std::sqrt(lo * hi);
+    (stable(mid, "") ? lo : hi) = mid;
+  }
+  EXPECT_TRUE(stable(0.99 * lo, ""));
+  EXPECT_FALSE(
+      stable(0.99 * lo, ", robot: [{at_s: 1, duration_s: 1, joint: joint_4, to_deg_or_m: 0}]"));
+}
+
+TEST(Gate, BarsAdmittanceControlUnlessForced) {
+  Experiment e = test::unassessed("srms_deploy_doss", kDiverging);
+  EXPECT_NE(applyStabilityCheck(e), "");
+  EXPECT_EQ(e.controller.stability, Stability::kUnstable);
+  test::Rig rig(e);
+  rig.arm();
+  rig.order(Request::kRun, test::segment(SegmentKind::kAdmittance, 5.0));
+  EXPECT_EQ(rig.state().refusal, Refusal::kUnstable);
+  EXPECT_EQ(rig.state().phase, Phase::kArmed);
+  rig.order(Request::kRun, test::sine(2, 0.01, 0.5, 1.0));  // anything else is free
+  EXPECT_EQ(rig.state().phase, Phase::kRunning);
+
+  Experiment forced = e;
+  forced.controller.stability = Stability::kForced;
+  EXPECT_NE(applyStabilityCheck(forced), "");
+  EXPECT_EQ(forced.controller.stability, Stability::kForced);
+  Experiment good = test::unassessed("srms_deploy_doss");
+  EXPECT_EQ(applyStabilityCheck(good), "");
+  EXPECT_EQ(good.controller.stability, Stability::kStable);
+}
+
+TEST(Gate, ProgramThatHasItDoesNotBegin) {
+  Experiment e = test::unassessed("srms_deploy_doss", kDiverging);
+  applyStabilityCheck(e);
+  test::Rig rig(e);
+  rig.tick(Request::kStart);
+  EXPECT_EQ(rig.state().refusal, Refusal::kUnstable);
+  for (int i = 0; i < 100; ++i) rig.tick();
+  EXPECT_EQ(rig.state().phase, Phase::kDisarmed);
+  rig.arm();
+  rig.tick(Request::kStart);
+  EXPECT_EQ(rig.state().refusal, Refusal::kUnstable);
+  EXPECT_EQ(rig.state().phase, Phase::kArmed);
+}
+
+TEST(Gate, LooksAtThePosesBetweenTheEndsOfAMove) {
+  // Hanging to either side the arm is borne; swinging over from one to the other it stretches out.
+  const auto stable = [](const std::string& to) {
+    const Experiment e = test::experiment(
+        "doss_on_table_4_1",
+        {"legs.filters=outputs", "base.mass_diagonal=[500,500,500,25,500,500]",
+         "base.damping_diagonal=[500,500,500,20,250,250]",
+         "robot.joints_deg_or_m=[0,0,-180,0,0,0,0]", "gravity_m_per_s2=0",
+         "program=[{move: {}}, {admittance: {duration_s: 20}, robot: [{at_s: 1, duration_s: 15, "
+         "joint: joint_3, to_deg_or_m: " +
+             to + "}]}]"});
+    return assessStability(e.controller, e.plant, false).stable;
+  };
+  EXPECT_TRUE(stable("-180"));
+  EXPECT_FALSE(stable("0"));
+  EXPECT_FALSE(stable("-90"));
+}
+
+TEST(Gate, LooksAtEachMotionWhateverElseThereIs) {
+  const Experiment e = test::experiment(
+      "puma_on_table_4_1",
+      {"program=[{trajectory: {duration_s: 0.1}, robot: [{at_s: 0, duration_s: 5, joint: joint_2, "
+       "to_deg_or_m: 0}]}, {admittance: {duration_s: 400}, robot: [{at_s: 290, duration_s: 1, "
+       "joint: joint_3, to_deg_or_m: 60}, {at_s: 4, duration_s: 1, joint: joint_1, to_deg_or_m: "
+       "0}, "
+       "{at_s: 1, duration_s: 1, joint: joint_1, to_deg_or_m: 100}]}]"});
+  const auto poses = programPoses(e.controller.program, e.plant);
+  const auto near = [&](int joint, double degrees) {
+    return std::any_of(poses.begin(), poses.end(), [&](const JointVector& q) {
+      return std::abs(q(joint) / kDegree - degrees) < 8.0;
+    });
+  };
+  EXPECT_TRUE(near(0, 50.0));
+  EXPECT_TRUE(near(0, 100.0));
+  EXPECT_TRUE(near(2, 75.0));
+  EXPECT_TRUE(near(1, -45.0));  // begun before admittance control, and still under way in it
+  EXPECT_NEAR(poses.back()(0), 0.0, 1e-9);
+}
+
+TEST(Gate, TakesTheRobotAsTheControllerKnowsIt) {
+  Experiment e = test::experiment("srms_deploy_doss", kDiverging);
+  e.plant.payload.robot = RobotModel();  // what a URDF without masses would say
+  EXPECT_FALSE(assessStability(e.controller, e.plant, false).stable);
+}
+
+TEST(Gate, LetsAFreeBaseDriftAndStillNamesCures) {
+  const auto verdict = [](std::vector<std::string> sets) {
+    const Experiment e = test::experiment("puma_on_table_4_1", std::move(sets));
+    return assessStability(e.controller, e.plant);
+  };
+  EXPECT_TRUE(
+      verdict({"base.stiffness_diagonal=[0,0,0,0,0,0]", "base.damping_diagonal=[0,0,0,0,0,0]"})
+          .stable);
+  // Free in x alone, too light in the rest: fewer modes, weaker K_P or damping still cure it.
+  const LoopVerdict light = verdict(
+      {"base.mass_diagonal=[12,12,12,6,6,6]", "base.stiffness_diagonal=[0,250,250,120,120,120]"});
+  EXPECT_FALSE(light.stable);
+  EXPECT_TRUE(light.stable_modes > 0 || light.damping_ratio > 0.0 || light.K_P > 0.0);
+}
+
+TEST(Margins, OfARobotWithoutMassAreTheMostThatIsLookedFor) {
+  const Experiment e = test::experiment("free_decay");
+  Loop loop = loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kExtending);
+  loop.robot_P = RigidBody{};
+  const Margins m = margins(loop);
+  EXPECT_EQ(m.gain, Margins::kMostGain);
+  EXPECT_EQ(m.delay, Margins::kMostDelay);
+}
+
+TEST(Gate, ScenariosOfTheRepositoryPass) {
+  for (const auto& entry : std::filesystem::directory_iterator(test::configDir() + "/scenarios")) {
+    const Experiment e = loadExperiment(entry.path());
+    EXPECT_TRUE(assessStability(e.controller, e.plant, false).stable) << entry.path();
+  }
+}
+
+TEST(Gate, WhatIsForcedStopsItselfEvenWhereTheEnvelopeHoldsIt) {
+  for (const char* scenario : {"srms_deploy_puma", "srms_unberth_puma", "srms_capture_puma"}) {
+    const Experiment e = test::experiment(
+        scenario, {"base.keep_modes=6", "legs.filters=outputs", "controller.stability=forced",
+                   "program=[{move: {}}, {calibration: {}}, {admittance: {duration_s: 60}}]"});
+    const RunResult result = runLockstep(e, nullptr, {});
+    EXPECT_EQ(result.phase, Phase::kStopped) << scenario;
+  }
+}
+
+TEST(LoopModel, BasesKeepTheModesThatTheRuleGives) {
+  for (const char* configuration : {"unberth", "low_hover", "deploy", "capture"}) {
+    int stable = kMaxModes;
+    int kept = 0;
+    for (const char* robot : {"puma", "doss"})
+      for (const char* filters : {"none", "outputs"}) {
+        const std::string name = std::string("srms_") + configuration + "_" + robot;
+        const auto set = std::string("legs.filters=") + filters;
+        kept = static_cast<int>(test::experiment(name).controller.admittance.stiffness.size());
+        const Experiment e = test::experiment(name, {set, "base.keep_modes=8"});
+        stable = std::min(stable, stableModes(e.controller, e.plant, e.plant.initial_joints));
+      }
+    EXPECT_EQ(kept, stable) << configuration;
+  }
+}
+
+}  // namespace
+}  // namespace ves
