@@ -3,13 +3,18 @@
 // What the commands share: their options, Ctrl-C, and the three exit statuses.
 #pragma once
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <csignal>
+#include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
+#include <iostream>
 #include <string>
 #include <vector>
 
@@ -36,12 +41,22 @@ inline CLI::Validator inRange(double lo, double hi) {
           fmt::format("in [{}, {}]", lo, hi)};
 }
 
-/// Ctrl-C and SIGTERM ask for a gentle end.
+/// Ctrl-C, SIGTERM and a terminal that closes ask for a gentle end. Nobody who stops reading what
+/// we print ends a run.
 inline void catchSignals() {
   struct sigaction action {};
   action.sa_handler = [](int) { stop_requested = 1; };
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
+  action.sa_handler = [](int) {
+    stop_requested = 1;
+    const int nowhere = open("/dev/null", O_RDWR);
+    for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+      if (isatty(fd)) dup2(nowhere, fd);
+  };
+  sigaction(SIGHUP, &action, nullptr);
+  action.sa_handler = SIG_IGN;
+  sigaction(SIGPIPE, &action, nullptr);
 }
 
 /// Where bases, robots and scenarios are.
@@ -64,7 +79,8 @@ struct Options {
     cli.add_option("scenario", scenario, "name in config/scenarios, or a .yaml file")->required();
     cli.add_option("--set", overrides, "KEY.PATH=VALUE as if it stood in the scenario")
         ->allow_extra_args(false);
-    cli.add_option("--seed", seed, "of the plant's noise")->check(CLI::Range(0, INT32_MAX));
+    cli.add_option("--seed", seed, "of the plant's noise")
+        ->check(CLI::Range(std::int64_t{0}, std::int64_t{UINT32_MAX}));
     cli.add_option("--calibration", calibration, "file that a calibration has left");
     cli.add_option("--masses", masses, "file that an identification has left, for the controller");
     cli.add_option("--servo", servo,
@@ -129,11 +145,19 @@ inline int run(CLI::App& cli, int argc, char** argv, const std::function<int()>&
     return kBadInput;
   }
   try {
-    return body();
+    const int status = body();
+    std::cout.flush();
+    if (std::fflush(stdout) != 0 || std::ferror(stdout) || !std::cout)
+      throw InputError(fmt::format("standard output: {}", std::strerror(errno)));
+    return status;
   } catch (const std::exception& error) {
     fmt::print(stderr, "{}: {}\n", cli.get_name(), error.what());
     return kBadInput;
   }
+}
+
+inline void printDamage(const Damage& damage) {
+  for (const std::string& line : damage.lines()) fmt::print(stderr, "warning: {}\n", line);
 }
 
 inline void printWarnings(const Experiment& experiment) {

@@ -29,6 +29,7 @@ int collectCommand(int argc, char** argv) {
   cli.add_option("--out", out, "file; standard output by default");
   return run(cli, argc, argv, [&] {
     const Series series = readSeries(log);
+    printDamage(series.damage);
     std::vector<Column> chosen;
     std::vector<bool> used(select.size(), false);
     for (const Column& column : columns(series.experiment))
@@ -57,7 +58,9 @@ int collectCommand(int argc, char** argv) {
       }
     }
     to.flush();
-    if (!to) throw InputError(fmt::format("--out {}: cannot be written", out));
+    if (!to)
+      throw InputError(fmt::format("{}: {}", out.empty() ? "standard output" : "--out " + out,
+                                   std::strerror(errno)));
     return kDone;
   });
 }

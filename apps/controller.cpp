@@ -72,7 +72,7 @@ int console(ControllerOptions& options) {
   bool failed = false;
   const RunResult result = runConsole(experiment, console, failed);
   fmt::print("{}", writeResults(console.launch.scenario.parent_path(), result, options.plots));
-  return result.good() && !failed ? kDone : kTripped;
+  return failed ? kTripped : statusOf(result);
 }
 
 }  // namespace

@@ -79,6 +79,7 @@ std::vector<StaticInterval> restsIn(const Series& series, const std::string& log
 
 int masses(const std::string& log, const std::string& file) {
   const Series series = readSeries(log);
+  printDamage(series.damage);
   const Experiment& e = series.experiment;
   const std::vector<StaticInterval> rests = restsIn(series, log);
   const StaticSetup setup = staticSetup(e.controller);
@@ -128,6 +129,7 @@ int masses(const std::string& log, const std::string& file) {
 /// The servos from any log in which every leg moves both ways.
 int servo(const std::string& log, const std::string& file) {
   const Series series = readSeries(log);
+  printDamage(series.damage);
   const ControllerConfig& c = series.experiment.controller;
   // The longest stretch under command without a gap.
   LegRecord longest, record;
@@ -212,7 +214,8 @@ int identifyCommand(int argc, char** argv) {
   of_plan->add_option("--joint-speed", speed, "mean, of the robot's joints [deg/s | cm/s]")
       ->check(inRange(0.1, 1000.0))
       ->capture_default_str();
-  of_plan->add_option("--seed", options.seed, "of the search")->check(CLI::Range(0, INT32_MAX));
+  of_plan->add_option("--seed", options.seed, "of the search")
+      ->check(CLI::Range(std::int64_t{0}, std::int64_t{UINT32_MAX}));
   of_plan->add_option("--out", file, "scenario file; ves-runs/identify_SCENARIO.yaml by default");
   CLI::App* of_masses = cli.add_subcommand(
       "masses", "mass parameters from a log in which platform and robot stand still in many poses");

@@ -19,7 +19,7 @@ int reportCommand(int argc, char** argv) {
   std::string out = "ves-runs/report";
   cli.add_option("--out", out, "folder for the results")->capture_default_str();
   return run(cli, argc, argv, [&] {
-    const std::filesystem::path folder = makeFolder(out);
+    const std::filesystem::path folder = claimFolder(out);
     const bool terminal = isatty(STDERR_FILENO);
     const std::int64_t start = monotonicNow();
     const Chapter4 chapter =

@@ -34,10 +34,11 @@ inline void writeFile(const std::filesystem::path& file, const std::string& text
 
 /// The folder of the results, and in it the resolved experiment for the processes to read.
 inline LaunchOptions prepareFolder(RunnerOptions& options, const Experiment& experiment) {
-  if (options.out.empty())
-    options.out = fmt::format("ves-runs/{}-{:%Y%m%d-%H%M%S}", experiment.name,
-                              fmt::localtime(std::time(nullptr)));
-  const std::filesystem::path folder = makeFolder(options.out);
+  const std::filesystem::path folder =
+      options.out.empty()
+          ? claimNewFolder(fmt::format("ves-runs/{}-{:%Y%m%d-%H%M%S}", experiment.name,
+                                       fmt::localtime(std::time(nullptr))))
+          : claimFolder(options.out);
   LaunchOptions launch;
   launch.program = ownProgram();
   launch.scenario = folder / "experiment.yaml";
@@ -56,6 +57,12 @@ inline void prepareBus(RunnerOptions& options, bool alone) {
   if (options.private_bus) enterPrivateBus();
   // Asked here first, so that a refusal is said once.
   if (options.process.realtime) claimRealtime(kRecorderPriority, true);
+}
+
+/// A recording that is not whole is no success.
+inline int statusOf(const RunResult& result) {
+  if (result.log_lost > 0) return kBadInput;
+  return result.good() ? kDone : kTripped;
 }
 
 inline int runExperiment(RunnerOptions& options) {
@@ -87,7 +94,7 @@ inline int runExperiment(RunnerOptions& options) {
   }
   progress.end();
   fmt::print("{}", writeResults(launch.scenario.parent_path(), result, options.plots));
-  return result.good() ? kDone : kTripped;
+  return statusOf(result);
 }
 
 }  // namespace ves::app

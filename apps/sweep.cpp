@@ -56,7 +56,7 @@ int sweepCommand(int argc, char** argv) {
       ->check(CLI::Range(1, 100'000'000))
       ->capture_default_str();
   cli.add_option("--seed", seed, "of draws and noise")
-      ->check(CLI::Range(0, INT32_MAX))
+      ->check(CLI::Range(std::int64_t{0}, std::int64_t{UINT32_MAX}))
       ->capture_default_str();
   cli.add_option("--set", sets, "KEY.PATH=VALUE of every run")->allow_extra_args(false);
   cli.add_option("--workers", workers, "processes")
@@ -103,7 +103,8 @@ int sweepCommand(int argc, char** argv) {
                         : "the same command goes on");
       return others ? kDone : kTripped;
     }
-    fmt::print("{} runs, {} of them not to their end\n{}\n", result.rows, result.not_good,
+    fmt::print("{} runs{}\n{}\n", result.rows,
+               result.not_good ? fmt::format(", {} of them not to their end", result.not_good) : "",
                options.file.string());
     return kDone;
   });

@@ -32,7 +32,42 @@ TEST(Gate, NamesWhatGrowsAndWhatItNamesCuresIt) {
   };
   EXPECT_TRUE(with("base.keep_modes=" + std::to_string(v.stable_modes)));
   EXPECT_FALSE(with("base.keep_modes=" + std::to_string(v.stable_modes + 1)));
+  EXPECT_NE(said.find("a damping ratio of "), std::string::npos) << said;
+  ASSERT_GT(v.damping_ratio, 0.02);
   EXPECT_TRUE(with("base.arm.damping_ratio=" + std::to_string(v.damping_ratio)));
+  EXPECT_FALSE(with("base.arm.damping_ratio=" + std::to_string(v.damping_ratio / 1.26)));
+}
+
+TEST(Gate, ItsWorstIsTheWorstOfAllPosesAndBothDirections) {
+  // Unfolded in the middle of its program, and back.
+  const Experiment folds = test::experiment(
+      "doss_on_table_4_1",
+      {"program=[{admittance: {duration_s: 9}, robot: [{at_s: 1, duration_s: 1, joint: joint_4, "
+       "to_deg_or_m: 0}, {at_s: 4, duration_s: 1, joint: joint_4, to_deg_or_m: 90}]}]"});
+  for (const Experiment& e : {folds, test::experiment("srms_deploy_doss", kDiverging)}) {
+    const LoopVerdict v = assessStability(e.controller, e.plant);
+    double most = 0.0, of_last = 0.0;
+    for (const Direction direction : {Direction::kExtending, Direction::kRetracting})
+      for (const JointVector& q : programPoses(e.controller.program, e.plant)) {
+        of_last = dominantRoot(loopOf(e.controller, e.plant, q, direction)).radius;
+        most = std::max(most, of_last);
+      }
+    EXPECT_NEAR(v.worst.radius, most, 1e-9) << e.name;
+    EXPECT_GT(most - of_last, 1e-7) << e.name << ": the last pose is the worst";
+  }
+}
+
+TEST(LoopModel, AnUndampedBaseAloneNeitherGrowsNorDecays) {  // its roots are on the unit circle
+  const Experiment e = test::experiment("puma_on_table_4_1");
+  Loop loop = loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kExtending);
+  loop.robot_P = RigidBody{};
+  loop.base.damping.setZero();
+  const Eigen::VectorXd stiffness = loop.base.stiffness;
+  for (int n = 1; n <= 40; ++n) {
+    loop.base.stiffness = 0.3 * n * stiffness;
+    EXPECT_TRUE(decays(loop)) << n;
+    EXPECT_NEAR(radius(loop), 1.0, 1e-9) << n;
+  }
 }
 
 TEST(Gate, LooksAtEveryPoseOfTheRobot) {

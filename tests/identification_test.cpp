@@ -127,42 +127,6 @@ TEST(SeparableCombinations, OfASlidingRobotLeaveEveryMassPositive) {
   }
 }
 
-TEST(PosePlan, StaysInRangesThatLieFarOff) {
-  Experiment e = test::experiment("puma_on_table_4_1");
-  Link& first = e.controller.payload.robot.links[0];
-  first.lower = 200 * kDegree;
-  first.upper = 300 * kDegree;
-  const StaticSetup setup = staticSetup(e.controller);
-  PosePlanOptions few;
-  few.exchanges = 50;
-  const PosePlan plan = planPoses(setup, separableCombinations(setup.robot), e.controller,
-                                  e.plant.initial_joints, few);
-  for (const PosePlan::Attitude& a : plan.attitudes)
-    for (const JointVector& q : a.q) {
-      EXPECT_GE(q(0), first.lower);
-      EXPECT_LE(q(0), first.upper);
-    }
-}
-
-TEST(PosePlan, IsBetterThanChanceAndInsideTheLimits) {
-  const Experiment e = test::experiment("doss_on_table_4_1");
-  const StaticSetup setup = staticSetup(e.controller);
-  const SeparableCombinations c = separableCombinations(setup.robot);
-  const PosePlanOptions options;
-  const PosePlan plan = planPoses(setup, c, e.controller, e.plant.initial_joints, options);
-  EXPECT_LT(plan.condition, 0.8 * plan.condition_random);
-  ASSERT_EQ(plan.attitudes.size(), 16u);
-  for (const PosePlan::Attitude& a : plan.attitudes) {
-    EXPECT_LE(a.rpy.cwiseAbs().maxCoeff(), options.tilt);
-    ASSERT_EQ(a.q.size(), 3u);
-    for (const JointVector& q : a.q)
-      for (int i = 0; i < setup.robot.joints; ++i) {
-        EXPECT_GE(q(i), setup.robot.link(i).lower);
-        EXPECT_LE(q(i), setup.robot.link(i).upper);
-      }
-  }
-}
-
 /// Rests as the machine gives them: legs read in counts, a noisy, biased, drifting sensor.
 std::vector<StaticInterval> readings(const Experiment& e, const StaticSetup& setup,
                                      const PosePlan& plan, std::uint32_t seed) {
@@ -222,6 +186,37 @@ TEST(Identification, ParametersAreWithinThreeDeviationsInNinetyNinePercent) {
     // Deviations that were too large would pass the first.
     EXPECT_NEAR(std::sqrt(squares / of), 1.0, 0.15) << name;
   }
+}
+
+TEST(Identification, BiasIsThatOfTheMiddleOfTheRests) {  // where its drift has no say
+  const Experiment e = test::experiment("puma_on_table_4_1");
+  const StaticSetup setup = staticSetup(e.controller);
+  const SeparableCombinations c = separableCombinations(setup.robot);
+  const PosePlan plan = planPoses(setup, c, e.controller, e.plant.initial_joints, {});
+  std::vector<StaticInterval> rests = readings(e, setup, plan, 1);
+  const MassEstimate before = estimateMasses(setup, c, rests);
+  double middle = 0.0;
+  for (const StaticInterval& rest : rests) middle += rest.t / static_cast<double>(rests.size());
+  const double drift = 0.5;  // [count/s]
+  for (StaticInterval& rest : rests) rest.counts.array() += drift * (rest.t - middle);
+  const MassEstimate after = estimateMasses(setup, c, rests);
+  EXPECT_LT((after.bias - before.bias).cwiseAbs().maxCoeff(), 1e-6);
+  EXPECT_LT((after.bias_drift - before.bias_drift).array().abs().maxCoeff() - drift, 1e-9);
+  EXPECT_LT((after.beta - before.beta).cwiseAbs().maxCoeff(), 1e-9);
+}
+
+TEST(Identification, ResidualIsWhatTheRestsScatterByChannel) {
+  const Experiment e = test::experiment("puma_on_table_4_1");
+  const StaticSetup setup = staticSetup(e.controller);
+  const SeparableCombinations c = separableCombinations(setup.robot);
+  const PosePlan plan = planPoses(setup, c, e.controller, e.plant.initial_joints, {});
+  std::vector<StaticInterval> rests = readings(e, setup, plan, 1);
+  std::mt19937 draw(2);
+  std::normal_distribution<double> n(0.0, 20.0);  // far above the sensor's own
+  for (StaticInterval& rest : rests) rest.counts(3) += n(draw);
+  const MassEstimate m = estimateMasses(setup, c, rests);
+  EXPECT_NEAR(m.residual(3), 20.0, 6.0);
+  EXPECT_LT(m.residual(0), 5.0);
 }
 
 TEST(Identification, SaysWhichParametersAreMixed) {

@@ -3,20 +3,16 @@
 #include <unistd.h>
 
 #include <cstring>
-#include <filesystem>
 #include <random>
 
 #include "support/refusal.hpp"
 #include "ves/config/document.hpp"
 #include "ves/transport/bus.hpp"
 #include "ves/transport/channels.hpp"
-#include "ves/transport/event_log.hpp"
 #include "ves/transport/fields.hpp"
 
 namespace ves {
 namespace {
-
-namespace fs = std::filesystem;
 
 using test::refusal;
 
@@ -117,103 +113,7 @@ TEST(Decode, TakesExactlyOneMessage) {
   EXPECT_FALSE(decode<leg_command_t>(bytes.data(), n));
 }
 
-// --- Log
-// ------------------------------------------------------------------------------------------
-
-class Log : public testing::Test {
- protected:
-  void SetUp() override {
-    file_ = fs::temp_directory_path() / ("ves_log_" + std::to_string(getpid()) + ".lcmlog");
-    LogWriter writer(file_.string());
-    for (int i = 0; i < 5; ++i) {
-      Sample s = goodSample();
-      s.sequence = i;
-      writer.write(channel::kSample, toMessage(s, {1, 2}, i), 1'000'000LL * i);
-    }
-  }
-  void TearDown() override { fs::remove(file_); }
-
-  std::string read() {
-    return refusal([&] {
-      LogReader reader(file_.string());
-      LogEvent event;
-      while (reader.next(event)) {
-      }
-    });
-  }
-  std::vector<char> bytes() {
-    std::ifstream in(file_, std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), {}};
-  }
-  void put(const std::vector<char>& bytes) {
-    std::ofstream(file_, std::ios::binary).write(bytes.data(), static_cast<long>(bytes.size()));
-  }
-  fs::path file_;
-};
-
-TEST_F(Log, ReadsWhatWasWritten) {
-  LogReader reader(file_.string());
-  LogEvent event;
-  for (int i = 0; i < 5; ++i) {
-    ASSERT_TRUE(reader.next(event));
-    EXPECT_EQ(event.channel, "VES_SAMPLE");
-    EXPECT_EQ(event.time_us, 1000 * i);
-    const auto sample = event.as<sample_t>();
-    ASSERT_TRUE(sample);
-    EXPECT_EQ(sample->header.sequence, i);
-  }
-  EXPECT_FALSE(reader.next(event));
-}
-
-TEST_F(Log, DamageIsNamedWithItsByte) {
-  const std::vector<char> good = bytes();
-  const std::size_t size = good.size() / 5;  // of an event
-  EXPECT_EQ(read(), "");
-
-  std::vector<char> bad = good;
-  bad[size] = 'x';  // the second sync word
-  put(bad);
-  EXPECT_NE(read().find("byte " + std::to_string(size) + ": sync word"), std::string::npos);
-
-  bad = good;
-  std::memset(&bad[20], 0x7f, 4);  // length of a channel name that crashes LCM's reader
-  put(bad);
-  EXPECT_NE(read().find("byte 20: channel name of"), std::string::npos);
-
-  bad = good;
-  std::memset(&bad[24], 0xff, 4);
-  put(bad);
-  EXPECT_NE(read().find("byte 24: message of 4294967295 bytes"), std::string::npos);
-
-  bad.assign(good.begin(), good.end() - 3);
-  put(bad);
-  EXPECT_NE(read().find("cut short"), std::string::npos);
-  bad.assign(good.begin(), good.begin() + 10);
-  put(bad);
-  EXPECT_NE(read().find("byte 0: 10 bytes left"), std::string::npos);
-  put({});
-  EXPECT_NE(read().find("empty"), std::string::npos);
-  EXPECT_NE(refusal([&] { LogReader(fs::temp_directory_path().string()); }).find("not a file"),
-            std::string::npos);
-  EXPECT_NE(refusal([&] { LogReader("/no/such.lcmlog"); }).find("no such file"), std::string::npos);
-}
-
-TEST_F(Log, NoDamageEverCrashesTheReader) {
-  const std::vector<char> good = bytes();
-  std::mt19937 random(1);
-  for (int k = 0; k < 2000; ++k) {
-    std::vector<char> bad = good;
-    for (unsigned flips = 1 + random() % 8; flips > 0; --flips)
-      bad[random() % bad.size()] = static_cast<char>(random());
-    if (random() % 3 == 0) bad.resize(random() % bad.size());
-    put(bad);
-    const std::string message = read();
-    EXPECT_EQ(message.find('\n'), std::string::npos);
-  }
-}
-
-// --- Bus: inside a network of its own
-// --------------------------------------------------------------
+// --- Bus: inside a network of its own ------------------------------------------------------------
 
 class PrivateBus : public testing::Test {
  protected:

@@ -100,21 +100,15 @@ Channel channelOf(const Loop& loop) {
   MatrixXd read = MatrixXd::Identity(kSize + 1, kSize + 1);
   read.row(kFirst) = read.row(Mechanics::kLength).eval();
 
-  // The controller's tick falls anywhere between two updates: in the middle, here.
+  // The controller's tick falls anywhere between two updates: in the middle, here. An update is
+  // three readings, so the pair's first is after it.
   const double before = h - between;  // from an update to the first reading
   MatrixXd all = MatrixXd::Identity(kSize + 1, kSize + 1);
   const double to_tick = 0.5 * h;
-  const bool read_before_tick = before <= to_tick;
-  if (read_before_tick)
-    all = pass(to_tick) * all;
-  else
-    all = pass(between) * read * pass(before - to_tick) * all;
+  all = pass(between) * read * pass(before - to_tick) * all;
   for (int k = 0; k + 1 < updates; ++k) all = pass(between) * read * pass(before) * next * all;
   all = next * all;
-  if (read_before_tick)
-    all = pass(to_tick - before) * read * pass(before) * all;
-  else
-    all = pass(to_tick) * all;
+  all = pass(to_tick) * all;
   std::vector<Index> read_states;
   for (Index i = 0; i < kSize; ++i) {
     const bool filter = i >= Mechanics::kFilter && i < Mechanics::kSensor;

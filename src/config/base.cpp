@@ -27,9 +27,12 @@ std::string definitenessFault(const Mat6& A, bool semidefinite) {
                            i, A(j, i));
   const double least = Eigen::SelfAdjointEigenSolver<Mat6>(A).eigenvalues()(0);
   if (semidefinite ? least >= -1e-12 * scale : least > 1e-12 * scale) return {};
-  return fmt::format(
-      "smallest eigenvalue {:.4g}, want {}", least,
-      semidefinite ? "none below 0 (positive semidefinite)" : "all above 0 (positive definite)");
+  return fmt::format("smallest eigenvalue {:.4g}, want {}", least,
+                     semidefinite   ? "none below 0 (positive semidefinite)"
+                     : least <= 0.0 ? "all above 0 (positive definite)"
+                                    : fmt::format("all above {:.4g}, 1e-12 of the largest entry "
+                                                  "(positive definite)",
+                                                  1e-12 * scale));
 }
 
 /// A 6x6 given by its rows or, when only it is not zero, by its diagonal.

@@ -14,7 +14,8 @@
 namespace ves {
 namespace {
 
-constexpr std::uintmax_t kMaxFileSize = 4 << 20;  // [B]
+constexpr std::uintmax_t kMaxFileSize = 2 << 20;  // [B]
+constexpr std::size_t kMaxKeys = 1000;            // [-] of one map
 constexpr int kMaxValues = 200'000;               // [-] in one document; aliases can multiply
 constexpr int kMaxDepth = 16;                     // [-] of `from` and of nesting
 
@@ -30,6 +31,50 @@ std::string readFile(const std::filesystem::path& path, const std::string& asked
   text << in.rdbuf();
   if (!in) throw InputError(what + "cannot be read");
   return text.str();
+}
+
+/// JSON and XML that are written later would fail on anything else.
+void requireUtf8(const std::string& text, const std::string& name) {
+  int line = 1;
+  for (std::size_t i = 0; i < text.size();) {
+    const auto byte = static_cast<unsigned char>(text[i]);
+    if (byte == '\n') ++line;
+    const std::size_t length = byte < 0x80   ? 1
+                               : byte < 0xc2 ? 0
+                               : byte < 0xe0 ? 2
+                               : byte < 0xf0 ? 3
+                               : byte < 0xf5 ? 4
+                                             : 0;
+    bool good = length > 0 && i + length <= text.size();
+    for (std::size_t k = 1; good && k < length; ++k)
+      good = (static_cast<unsigned char>(text[i + k]) & 0xc0) == 0x80;
+    if (good && length > 2) {  // neither overlong, nor a surrogate, nor past U+10FFFF
+      const auto next = static_cast<unsigned char>(text[i + 1]);
+      good = !(byte == 0xe0 && next < 0xa0) && !(byte == 0xed && next >= 0xa0) &&
+             !(byte == 0xf0 && next < 0x90) && !(byte == 0xf4 && next >= 0x90);
+    }
+    if (!good)
+      throw InputError(fmt::format("{}:{}: byte {:#04x} is no UTF-8 text, want the file in UTF-8",
+                                   name, line, byte));
+    i += length;
+  }
+}
+
+/// YAML::Load would leave the others out.
+void requireOneDocument(const std::string& text, const std::string& name) {
+  std::istringstream in(text);
+  bool content = false;
+  int number = 1;
+  for (std::string line; std::getline(in, line); ++number) {
+    const bool marker = line.rfind("---", 0) == 0 &&
+                        (line.size() == 3 || line[3] == ' ' || line[3] == '\t' || line[3] == '\r');
+    if (marker && content)
+      throw InputError(fmt::format("{}:{}: a second YAML document begins here, want one in a file",
+                                   name, number));
+    const std::size_t first = line.find_first_not_of(" \t\r");
+    content =
+        content || (!marker && first != std::string::npos && line[first] != '#' && line[0] != '%');
+  }
 }
 
 class Converter {
@@ -49,8 +94,12 @@ class Converter {
     const std::string& tag = node.Tag();
     if (tag.size() > 1 && tag[0] == '!') {
       value.tag = tag.substr(1);
-      if (value.tag != "found" && value.tag != "derived" && value.tag != "substitute")
-        refuse(fmt::format("tag !{}, want !found, !derived or !substitute", value.tag));
+      if (value.tag == "replace") {
+        value.whole = true;
+        value.tag.clear();
+      } else if (value.tag != "found" && value.tag != "derived" && value.tag != "substitute") {
+        refuse(fmt::format("tag !{}, want !found, !derived, !substitute or !replace", value.tag));
+      }
     }
     switch (node.Type()) {
       case YAML::NodeType::Undefined:
@@ -65,6 +114,7 @@ class Converter {
         break;
       case YAML::NodeType::Map:
         value.kind = Value::Kind::kMap;
+        if (node.size() > kMaxKeys) refuse(fmt::format("more than {} keys in one map", kMaxKeys));
         for (const auto& entry : node) {
           if (!entry.first.IsScalar()) refuse("a key that is not a word");
           const std::string& key = entry.first.Scalar();
@@ -120,6 +170,7 @@ void resolve(Value& value, const std::filesystem::path& directory, int depth) {
     const std::filesystem::path path = directory / urdf->text;
     const auto i = static_cast<std::size_t>(urdf - value.children.data());
     urdf->text = readFile(path, at);
+    requireUtf8(urdf->text, path.lexically_normal().string());
     urdf->file = std::make_shared<const std::string>(path.lexically_normal().string());
     urdf->line = 1;
     value.keys[i] = "urdf_text";
@@ -139,7 +190,9 @@ void resolve(Value& value, const std::filesystem::path& directory, int depth) {
 }
 
 Value parse(const std::string& text, const std::string& name) {
+  requireUtf8(text, name);
   try {
+    requireOneDocument(text, name);
     return Converter(name).convert(YAML::Load(text));
   } catch (const YAML::Exception& error) {
     throw InputError(fmt::format("{}:{}: not YAML: {}", name, error.mark.line + 1, error.msg));
@@ -217,20 +270,41 @@ void applyOverride(Value& document, const std::string& assignment) {
     throw InputError(fmt::format("--set {}: want key.path=value", assignment));
   Value leaf = parse(assignment.substr(equals + 1), "--set " + assignment);
   leaf.whole = true;
-  std::string path = assignment.substr(0, equals);
-  for (;;) {
-    const std::size_t dot = path.rfind('.');
-    Value map;
-    map.kind = Value::Kind::kMap;
-    map.file = leaf.file;
-    map.line = 1;
-    map.keys = {dot == std::string::npos ? path : path.substr(dot + 1)};
-    map.children = {std::move(leaf)};
-    leaf = std::move(map);
-    if (dot == std::string::npos) break;
-    path.resize(dot);
+  std::vector<std::string> keys;
+  for (std::size_t begin = 0, dot = 0; dot < equals; begin = dot + 1) {
+    dot = std::min(assignment.find('.', begin), equals);
+    keys.push_back(assignment.substr(begin, dot - begin));
   }
-  merge(document, std::move(leaf));
+  Value* at = &document;
+  const auto entry = [&](const std::string& key) -> Value& {
+    std::size_t index = 0;
+    const auto [end, error] = std::from_chars(key.data(), key.data() + key.size(), index);
+    if (error != std::errc() || end != key.data() + key.size() || index >= at->children.size())
+      throw InputError(fmt::format("--set {}: '{}', want the number of an entry, 0 to {}",
+                                   assignment, key, std::ssize(at->children) - 1));
+    return at->children[index];
+  };
+  Value map;
+  map.kind = Value::Kind::kMap;
+  map.file = leaf.file;
+  map.line = 1;
+  for (std::size_t i = 0; i + 1 < keys.size(); ++i) {
+    if (at->kind == Value::Kind::kList) {
+      at = &entry(keys[i]);
+      continue;
+    }
+    if (at->kind != Value::Kind::kMap) *at = map;
+    if (!at->find(keys[i])) at->put(keys[i], map);
+    at = at->find(keys[i]);
+  }
+  if (at->kind == Value::Kind::kList) {
+    entry(keys.back()) = std::move(leaf);
+    return;
+  }
+  if (at->kind != Value::Kind::kMap) *at = map;
+  map.put(keys.back(), std::move(leaf));
+  resolve(map, std::filesystem::current_path(), 0);  // from, urdf: beside where it was typed
+  at->put(map.keys[0], std::move(map.children[0]));
 }
 
 std::string fingerprint(const std::string& text) {

@@ -20,12 +20,16 @@ void requireInLimits(const Section& s, std::string_view key, const UrdfRobot& ro
 Robot readRobot(Section s, const Value& document) {
   Robot robot;
   const Value* text = document.find("robot")->find("urdf_text");
+  if (!text) s.fail("urdf", "missing, want the robot's URDF file");
   robot.urdf = loadUrdf(s.text("urdf_text"), *text->file);
   robot.X_PR = {Mat3::Identity(), s.vector("adapter_position_m", 3, -10.0, 10.0)};
   robot.adapter_R = readBox(s.section("adapter"));
   robot.X_RL0 = {rotation(s.vector("mount_rpy_deg", 3, -360.0, 360.0) * kDegree),
                  s.vector("mount_m", 3, -10.0, 10.0)};
-  const Eigen::VectorXd q = s.vector("joints_deg_or_m", robot.urdf.model.joints, -1e6, 1e6);
+  Eigen::VectorXd q(robot.urdf.model.joints);
+  if (q.size() > 0) q = s.vector("joints_deg_or_m", robot.urdf.model.joints, -1e6, 1e6);
+  if (q.size() == 0 && s.has("joints_deg_or_m") && !s.texts("joints_deg_or_m").empty())
+    s.fail("joints_deg_or_m", "the robot has no joint that moves, want none");
   for (int i = 0; i < robot.urdf.model.joints; ++i) {
     robot.q(i) = q(i) * jointUnit(robot.urdf.model.link(i));
     requireInLimits(s, "joints_deg_or_m", robot.urdf, i, robot.q(i));

@@ -58,8 +58,12 @@ bool Section::has(std::string_view key) {
 const Value& Section::need(std::string_view key) {
   used_.emplace(key);
   const Value* value = value_->find(key);
-  if (!value) fail(key, "missing");
-  return *value;
+  if (value) return *value;
+  // A slip of the pen is told as such.
+  for (const std::string& given : value_->keys)
+    if (!used_.count(given) && distance(given, key) <= 1 + given.size() / 3)
+      fail(given, fmt::format("unknown key, did you mean {}?", key));
+  fail(key, "missing");
 }
 
 double Section::toNumber(const Value& value, const std::string& path, double lo, double hi) const {

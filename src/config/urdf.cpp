@@ -31,6 +31,12 @@ Transform toTransform(const urdf::Pose& pose) {
           {pose.position.x, pose.position.y, pose.position.z}};
 }
 
+constexpr std::size_t kMaxElement = 8192;  // [B]
+constexpr int kMaxDepth = 64;              // [-] of elements
+constexpr double kMaxLength = 1e3;         // [m]
+constexpr double kMaxMass = 1e6;           // [kg]
+constexpr double kMaxInertia = 1e9;        // [kg m^2]
+
 class Loader {
  public:
   Loader(const std::string& text, const std::string& file) : text_(text), file_(file) {}
@@ -48,8 +54,10 @@ class Loader {
       const urdf::Joint& joint = *link->child_joints.front();
       const Transform X_body_joint =
           X_body_link * toTransform(joint.parent_to_joint_origin_transform);
-      if (!X_body_joint.p.allFinite() || !X_body_joint.R.allFinite())
-        refuse("joint", joint.name, "its origin is not a finite number");
+      if (!(X_body_joint.p.cwiseAbs().maxCoeff() <= kMaxLength) || !X_body_joint.p.allFinite() ||
+          !X_body_joint.R.allFinite())
+        refuse("joint", joint.name,
+               fmt::format("its origin, want numbers within {} m", kMaxLength));
       link = urdf->getLink(joint.child_link_name).get();
       if (joint.type == urdf::Joint::FIXED) {
         X_body_link = X_body_joint;
@@ -63,7 +71,26 @@ class Loader {
   }
 
  private:
+  /// What makes the XML parser slow or lets it run out of stack.
+  void requireReasonable() const {
+    int depth = 0;
+    for (std::size_t at = 0; (at = text_.find('<', at)) != std::string::npos;) {
+      const std::size_t end = std::min(text_.find('>', at), text_.size());
+      if (end - at > kMaxElement)
+        throw InputError(fmt::format("{}:{}: an element of {} bytes, want at most {}", file_,
+                                     lineAt(at), end - at, kMaxElement));
+      const char first = at + 1 < text_.size() ? text_[at + 1] : '>';
+      if (first == '/')
+        --depth;
+      else if (first != '?' && first != '!' && text_[end - 1] != '/' && ++depth > kMaxDepth)
+        throw InputError(
+            fmt::format("{}:{}: elements nested deeper than {}", file_, lineAt(at), kMaxDepth));
+      at = end;
+    }
+  }
+
   urdf::ModelInterfaceSharedPtr parse() const {
+    requireReasonable();
     Messages messages;
     urdf::ModelInterfaceSharedPtr urdf;
     try {
@@ -123,10 +150,15 @@ class Loader {
     Mat3 I;
     I << in.ixx, in.ixy, in.ixz, in.ixy, in.iyy, in.iyz, in.ixz, in.iyz, in.izz;
     body.I_Bcm_B = X_link_com.R * I * X_link_com.R.transpose();
-    if (!(in.mass >= 0.0) || !std::isfinite(in.mass))
-      refuse("link", link.name, fmt::format("mass {}, want a number of at least 0", in.mass));
-    if (!body.p_BoBcm_B.allFinite() || !I.allFinite())
-      refuse("link", link.name, "its centre of mass or inertia is not a finite number");
+    if (!(in.mass >= 0.0 && in.mass <= kMaxMass))
+      refuse("link", link.name,
+             fmt::format("mass {}, want a number in [0, {}]", in.mass, kMaxMass));
+    if (!body.p_BoBcm_B.allFinite() || !(body.p_BoBcm_B.cwiseAbs().maxCoeff() <= kMaxLength))
+      refuse("link", link.name,
+             fmt::format("its centre of mass, want numbers within {} m", kMaxLength));
+    if (!I.allFinite() || !(I.cwiseAbs().maxCoeff() <= kMaxInertia))
+      refuse("link", link.name,
+             fmt::format("its inertia, want numbers within {} kg m^2", kMaxInertia));
     const Vec3 principal = Eigen::SelfAdjointEigenSolver<Mat3>(I).eigenvalues();
     if (principal(0) < -1e-12 * std::abs(principal(2)))
       refuse("link", link.name,

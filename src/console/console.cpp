@@ -67,8 +67,9 @@ class Console {
 
   /// A line of news; an open prompt is put back below it.
   void say(const std::string& text) {
-    if (!prompt_.empty()) fmt::print("\r\033[K");
-    fmt::print("{}\n{}", text, prompt_);
+    // Nobody who stops reading ends a run: fmt::print would throw.
+    if (!prompt_.empty()) std::fputs("\r\033[K", stdout);
+    std::fputs((text + "\n" + prompt_).c_str(), stdout);
     std::fflush(stdout);
   }
 
@@ -149,7 +150,7 @@ class Console {
   /// One line of input; nothing at its end, after Ctrl-C, or when the controller has ended.
   std::optional<std::string> line(const std::string& prompt) {
     prompt_ = terminal_ ? prompt : "";
-    fmt::print("{}", prompt_);
+    std::fputs(prompt_.c_str(), stdout);
     std::fflush(stdout);
     std::optional<std::string> out;
     while (!over()) {
@@ -165,7 +166,7 @@ class Console {
       if (n <= 0) break;
       input_.append(buffer, static_cast<std::size_t>(n));
     }
-    if (!out && terminal_) fmt::print("\n");
+    if (!out && terminal_) std::fputs("\n", stdout);
     prompt_.clear();
     return out;
   }

@@ -112,9 +112,9 @@ FaultOutcome fullDisk(const fs::path& config) {
   const Experiment e = faultScenario(config, "puma_on_table_4_1", {});
   LogWriter log("/dev/full");
   const RunResult with = runLockstep(e, &log, nullptr), without = runLockstep(e, nullptr, nullptr);
-  return outcome(with.good() && with.lost > 0 && with.ticks == without.ticks,
+  return outcome(with.good() && with.log_lost > 0 && with.ticks == without.ticks,
                  fmt::format("{} after {} ticks, {} events lost; {} ticks without a log",
-                             name(with.phase), with.ticks, with.lost, without.ticks));
+                             name(with.phase), with.ticks, with.log_lost, without.ticks));
 }
 
 }  // namespace

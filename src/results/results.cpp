@@ -1,8 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/results/results.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
 #include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
 
 #include "ves/realtime/realtime.hpp"
 #include "ves/results/plots.hpp"
@@ -19,12 +24,33 @@ std::filesystem::path makeFolder(const std::filesystem::path& folder) {
   return std::filesystem::absolute(folder);
 }
 
+std::filesystem::path claimFolder(const std::filesystem::path& folder) {
+  const std::filesystem::path made = makeFolder(folder);
+  const int fd = open(made.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);  // kept to the end
+  if (fd < 0) throw InputError(fmt::format("--out {}: {}", folder.string(), strerror(errno)));
+  if (flock(fd, LOCK_EX | LOCK_NB) == 0) return made;
+  close(fd);
+  throw InputError(fmt::format("--out {}: another run is writing there", folder.string()));
+}
+
+std::filesystem::path claimNewFolder(const std::filesystem::path& folder) {
+  makeFolder(folder.parent_path());
+  for (int n = 1;; ++n) {
+    const std::filesystem::path named =
+        n == 1 ? folder : std::filesystem::path(fmt::format("{}-{}", folder.string(), n));
+    std::error_code error;
+    if (std::filesystem::create_directory(named, error)) return claimFolder(named);
+    if (error) throw InputError(fmt::format("{}: {}", named.string(), error.message()));
+  }
+}
+
 std::string writeResults(const std::filesystem::path& folder, const RunResult& result, bool plots) {
   const Series series = readSeries((folder / "run.lcmlog").string());
   writeCsv(series, (folder / "series.csv").string());
   const auto summary = summarise(series, result);
   writeSummary(summary, (folder / "summary.json").string());
   std::string out = table(summary) + "\n";
+  for (const std::string& line : series.damage.lines()) out += fmt::format("  {}\n", line);
   std::string files = "run.lcmlog, series.csv, summary.json";
   if (plots)
     for (const std::filesystem::path& plot : drawPlots(series, folder))
@@ -51,16 +77,18 @@ void Progress::show(Phase phase, int segment, std::int64_t tick, const double (&
         name(experiment_.controller.program.segments[static_cast<std::size_t>(segment)].kind),
         segment + 1, experiment_.controller.program.size);
   const double t = static_cast<double>(tick * experiment_.controller.period) * kSecondPerNanosecond;
-  fmt::print(stderr,
-             "{}{:7.2f} s  {:<24} x {:+6.1f}  y {:+6.1f}  z {:+6.1f} mm   alpha {:+6.2f}  beta "
-             "{:+6.2f}  gamma {:+6.2f} deg{}",
-             terminal ? "\r" : "", t, what, x[0] * 1e3, x[1] * 1e3, x[2] * 1e3, x[3] / kDegree,
-             x[4] / kDegree, x[5] / kDegree, terminal ? "" : "\n");
+  // Nobody who stops reading ends a run: fmt::print would throw.
+  const std::string line = fmt::format(
+      "{}{:7.2f} s  {:<24} x {:+6.1f}  y {:+6.1f}  z {:+6.1f} mm   alpha {:+6.2f}  beta "
+      "{:+6.2f}  gamma {:+6.2f} deg{}",
+      terminal ? "\r" : "", t, what, x[0] * 1e3, x[1] * 1e3, x[2] * 1e3, x[3] / kDegree,
+      x[4] / kDegree, x[5] / kDegree, terminal ? "" : "\n");
+  std::fputs(line.c_str(), stderr);
   open_ = terminal;
 }
 
 void Progress::end() {
-  if (open_) fmt::print(stderr, "\n");
+  if (open_) std::fputs("\n", stderr);
   open_ = false;
 }
 

@@ -46,18 +46,45 @@ Series readSeries(const std::string& log) {
   Series series;
   bool configured = false;
   RowMaker rows;
-  LogReader reader(log);
+  LogReader reader(log, &series.damage);
   LogEvent event;
+  std::optional<Identity> controller;
+  std::int64_t tick = -1;
+  bool over = false, told = false;
   while (reader.next(event)) {
+    if (event.channel == channel::kState) {
+      if (const auto state = event.as<state_t>()) {
+        const Identity from{state->header.source, state->header.epoch};
+        if (!controller) controller = from;
+        const bool same = from.source == controller->source && from.epoch == controller->epoch;
+        // In lockstep every controller has the same name, but ticks do not begin anew in a run.
+        over = over || (same && state->header.sequence < tick);
+        if (!same || over) {
+          if (!std::exchange(told, true))
+            series.damage.add(fmt::format(
+                "{}: byte {}: another controller's run begins here (two logs put together?); its "
+                "ticks are left out",
+                log, event.offset));
+          continue;
+        }
+        tick = state->header.sequence;
+      }
+    }
     if (event.channel == channel::kExperiment && !configured) {
       const auto message = event.require<experiment_t>(log);
       series.experiment = parseExperiment(message.resolved, log + ":configuration");
       series.version = message.version;
       configured = true;
     }
-    if (const auto row = rows.add(event, log)) series.rows.push_back(*row);
+    try {
+      if (const auto row = rows.add(event, log)) series.rows.push_back(*row);
+    } catch (const InputError& error) {
+      series.damage.add(error.what());
+    }
   }
   if (const auto row = rows.finish()) series.rows.push_back(*row);
+  if (series.damage.any() && (!configured || series.rows.empty()))
+    throw InputError(series.damage.first());
   if (!configured)
     throw InputError(
         fmt::format("{}: no configuration in this log (channel {})", log, channel::kExperiment));

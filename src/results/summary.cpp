@@ -218,6 +218,9 @@ nlohmann::ordered_json summarise(const Series& series, const RunResult& result) 
   out["simulated_s"] = result.simulated;
   out["wall_s"] = result.wall;
   out["messages_lost"] = result.lost;
+  out["messages_malformed"] = result.malformed;
+  out["log_events_lost"] = result.log_lost;
+  out["log_trouble"] = result.log_trouble;
   out["real_time_factor"] = result.wall > 0.0 ? result.simulated / result.wall : 0.0;
   addTracking(series, out);
   addEmulation(series, out);
@@ -237,9 +240,14 @@ std::string table(const nlohmann::ordered_json& s) {
       s["ended"].get<std::string>(), number("simulated_s"), s["ticks"].get<std::int64_t>(),
       number("real_time_factor"), s["substitute_values"].get<int>());
   if (s["messages_lost"].get<std::int64_t>() > 0)
-    out += fmt::format(
-        "  {} messages or log events were lost (machine too busy, disk full?): the log has holes\n",
-        s["messages_lost"].get<std::int64_t>());
+    out += fmt::format("  {} messages were lost (machine too busy?): the log has holes\n",
+                       s["messages_lost"].get<std::int64_t>());
+  if (s["log_events_lost"].get<std::int64_t>() > 0)
+    out += fmt::format("  {}: {} events of the log lost\n", s["log_trouble"].get<std::string>(),
+                       s["log_events_lost"].get<std::int64_t>());
+  if (s["messages_malformed"].get<std::int64_t>() > 0)
+    out += fmt::format("  {} malformed messages on the bus, not recorded\n",
+                       s["messages_malformed"].get<std::int64_t>());
   if (s["ended"] == name(Phase::kDisarmed))
     out +=
         fmt::format("  never armed: {}\n", s["first_cause"] == name(Check::kCount)

@@ -52,7 +52,11 @@ RunResult runLockstep(const Experiment& experiment, LogWriter* log, const Watch&
     }
   }
   RunResult result = monitor.result(monotonicNow() - start);
-  if (log) result.lost = log->lost();
+  if (log) {
+    log->flush();
+    result.log_lost = log->lost();
+    result.log_trouble = log->trouble();
+  }
   return result;
 }
 

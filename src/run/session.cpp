@@ -29,6 +29,7 @@ Session::Session(const Experiment& experiment, const LaunchOptions& options)
     : experiment_(experiment), bus_(options.process.url), start_(monotonicNow()) {
   const ProcessOptions& process = options.process;
   if (!process.log.empty() && !process.lockstep) {
+    log_file_ = process.log;
     log_ = std::make_unique<LogWriter>(process.log);
     log_->write(channel::kExperiment, describe(experiment, {}, 0), wallClock());
   }
@@ -52,7 +53,19 @@ Session::Session(const Experiment& experiment, const LaunchOptions& options)
 }
 
 void Session::receive(const std::string& channel, const void* data, std::uint32_t size) {
-  if (log_) log_->write(channel, data, size, wallClock());
+  if (!wellFormed(channel, data, size)) {
+    ++result_.malformed;
+    return;
+  }
+  if (log_) {
+    const bool whole = log_->lost() == 0;
+    log_->write(channel, data, size, wallClock());
+    if (whole && log_->lost() > 0)
+      std::fputs(fmt::format("warning: {}: {}; events of the log are being lost, the run goes on\n",
+                             log_file_, log_->trouble())
+                     .c_str(),
+                 stderr);
+  }
   if (on_message_) on_message_(channel, data, size);
   if (channel != channel::kState) return;
   const auto state = decode<state_t>(data, size);
@@ -128,7 +141,12 @@ RunResult Session::result() {
   if (status == 0 && !result.let_go) result.phase = Phase::kParked;
   if (status == 1 && result.phase == Phase::kParked && !result.aborted)
     result.phase = Phase::kStopped;
-  result.lost = bus_.failed() + (log_ ? log_->lost() + result.ticks - heard_ : 0);
+  result.lost = bus_.failed() + (log_ ? result.ticks - heard_ : 0);
+  if (log_) {
+    log_->flush();
+    result.log_lost = log_->lost();
+    result.log_trouble = log_->trouble();
+  }
   return result;
 }
 

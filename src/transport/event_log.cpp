@@ -1,21 +1,28 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/transport/event_log.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <array>
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
-#include <lcm/lcm-cpp.hpp>
 
 #include "ves/base/errors.hpp"
 
 namespace ves {
 namespace {
 
-constexpr std::uint32_t kSync = 0xEDA1DA01;    // before each event
-constexpr std::int64_t kHeaderSize = 28;       // [B]
-constexpr std::uint32_t kMaxChannel = 63;      // [B] LCM's own limit
-constexpr std::uint32_t kMaxData = 16u << 20;  // [B] far above any message of ours
+constexpr std::uint32_t kSync = 0xEDA1DA01;        // before each event
+constexpr std::int64_t kHeaderSize = 28;           // [B]
+constexpr std::uint32_t kMaxChannel = 63;          // [B] LCM's own limit
+constexpr std::uint32_t kMaxData = 16u << 20;      // [B] far above any message of ours
+constexpr std::size_t kBuffer = 1u << 16;          // [B]
+constexpr std::size_t kRoom = 4096;                // [B] of it for one more message
+constexpr std::int64_t kFlushAfter = 500'000'000;  // [ns]
 
 std::uint64_t bigEndian(const std::uint8_t* bytes, int n) {
   std::uint64_t x = 0;
@@ -23,34 +30,84 @@ std::uint64_t bigEndian(const std::uint8_t* bytes, int n) {
   return x;
 }
 
-}  // namespace
-
-LogWriter::LogWriter(const std::string& path) : file_(std::make_unique<lcm::LogFile>(path, "w")) {
-  if (!file_->good()) throw InputError(fmt::format("{}: cannot be written", path));
+void put(std::vector<std::uint8_t>& to, std::uint64_t value, int bytes) {
+  for (int i = bytes - 1; i >= 0; --i) to.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
 }
 
-LogWriter::~LogWriter() = default;
+}  // namespace
+
+LogWriter::LogWriter(const std::string& path)
+    : file_(open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666)) {
+  if (file_ < 0) throw InputError(fmt::format("{}: cannot be written: {}", path, strerror(errno)));
+  waiting_.reserve(kBuffer);
+}
+
+LogWriter::~LogWriter() {
+  flush();
+  close(file_);
+}
 
 void LogWriter::write(const std::string& channel, const void* data, std::int64_t size,
-                      std::int64_t time_ns) {
-  lcm::LogEvent event;
-  event.eventnum = 0;  // the file counts
-  event.channel = channel;
-  event.timestamp = time_ns / 1000;
-  event.datalen = static_cast<std::int32_t>(size);
-  event.data = const_cast<void*>(data);
-  if (file_->writeEvent(&event) != 0) ++lost_;
+                      std::int64_t time_ns) noexcept {
+  const auto* bytes = static_cast<const std::uint8_t*>(data);
+  put(waiting_, kSync, 4);
+  put(waiting_, static_cast<std::uint64_t>(events_++), 8);
+  put(waiting_, static_cast<std::uint64_t>(time_ns / 1000), 8);
+  put(waiting_, channel.size(), 4);
+  put(waiting_, static_cast<std::uint64_t>(size), 4);
+  waiting_.insert(waiting_.end(), channel.begin(), channel.end());
+  waiting_.insert(waiting_.end(), bytes, bytes + size);
+  ++waiting_events_;
+  if (waiting_.size() < kBuffer - kRoom && time_ns - flushed_at_ < kFlushAfter) return;
+  flush();
+  flushed_at_ = time_ns;
+}
+
+void LogWriter::flush() noexcept {
+  std::size_t written = 0;
+  while (written < waiting_.size()) {
+    const ssize_t n = ::write(file_, waiting_.data() + written, waiting_.size() - written);
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) break;
+    written += static_cast<std::size_t>(n);
+  }
+  if (written == waiting_.size()) {
+    whole_ += static_cast<std::int64_t>(written);
+  } else {
+    error_ = errno;
+    lost_ += waiting_events_;
+    // No half event stays; what comes later may find room again.
+    if (ftruncate(file_, whole_) == 0) lseek(file_, whole_, SEEK_SET);
+  }
+  waiting_.clear();
+  waiting_events_ = 0;
+}
+
+std::string LogWriter::trouble() const { return error_ == 0 ? "" : strerror(error_); }
+
+std::string LogEvent::refusal(const std::string& log, const char* type) const {
+  return fmt::format(
+      "{}: byte {}: this is no {} of schema {}, which this program reads (another version wrote "
+      "it, "
+      "or it is damaged)",
+      log, offset, type, kSchema);
 }
 
 void LogEvent::refuse(const std::string& log, const char* type) const {
-  throw InputError(
-      fmt::format("{}: byte {}: this is no {} of schema {}, which this program reads (another "
-                  "version wrote it, or "
-                  "it is damaged)",
-                  log, offset, type, kSchema));
+  throw InputError(refusal(log, type));
 }
 
-LogReader::LogReader(const std::string& path) : path_(path) {
+void Damage::add(const std::string& what) {
+  if (count_++ < kFew) first_few_.push_back(what);
+}
+
+std::vector<std::string> Damage::lines() const {
+  std::vector<std::string> out = first_few_;
+  if (count_ > kFew) out.push_back(fmt::format("and {} more such places", count_ - kFew));
+  return out;
+}
+
+LogReader::LogReader(const std::string& path, Damage* damage) : path_(path), damage_(damage) {
   std::error_code error;
   if (!std::filesystem::exists(path, error)) throw InputError(path + ": no such file");
   if (!std::filesystem::is_regular_file(path, error)) throw InputError(path + ": not a file");
@@ -61,6 +118,41 @@ LogReader::LogReader(const std::string& path) : path_(path) {
 }
 
 bool LogReader::next(LogEvent& event) {
+  if (!damage_) return read(event);
+  for (;;) {
+    const std::int64_t before = offset_;
+    try {
+      return read(event);
+    } catch (const InputError& error) {
+      seekNextEvent();
+      damage_->add(fmt::format("{}; {} bytes left out", error.what(), offset_ - before));
+    }
+  }
+}
+
+/// To the next sync word after offset_, or the end.
+void LogReader::seekNextEvent() {
+  constexpr std::int64_t kChunk = 1 << 16;
+  std::vector<char> chunk(kChunk);
+  std::array<char, 4> sync;
+  for (int i = 0; i < 4; ++i)
+    sync[static_cast<std::size_t>(i)] = static_cast<char>(kSync >> (24 - 8 * i));
+  for (std::int64_t at = offset_ + 1; at < size_; at += kChunk - 3) {
+    in_.clear();
+    in_.seekg(at);
+    in_.read(chunk.data(), kChunk);
+    const auto end = chunk.begin() + in_.gcount();
+    const auto found = std::search(chunk.begin(), end, sync.begin(), sync.end());
+    if (found == end) continue;
+    offset_ = at + (found - chunk.begin());
+    in_.clear();
+    in_.seekg(offset_);
+    return;
+  }
+  offset_ = size_;
+}
+
+bool LogReader::read(LogEvent& event) {
   const std::int64_t left = size_ - offset_;
   if (left == 0) return false;
   std::array<std::uint8_t, kHeaderSize> header;

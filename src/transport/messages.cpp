@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/transport/messages.hpp"
 
+#include "ves/transport/channels.hpp"
+
 #include <unistd.h>
 
 #include <algorithm>
@@ -266,6 +268,17 @@ std::optional<Order> fromMessage(const operator_t& m) noexcept {
     good = good && m.duration > 0.0;
   if (!good) return {};
   return order;
+}
+
+bool wellFormed(const std::string& channel, const void* data, std::int64_t size) {
+  if (channel == channel::kSample) return decode<sample_t>(data, size).has_value();
+  if (channel == channel::kLegCommand) return decode<leg_command_t>(data, size).has_value();
+  if (channel == channel::kState) return decode<state_t>(data, size).has_value();
+  if (channel == channel::kTruth) return decode<truth_t>(data, size).has_value();
+  if (channel == channel::kTiming) return decode<timing_t>(data, size).has_value();
+  if (channel == channel::kRobot) return decode<robot_command_t>(data, size).has_value();
+  if (channel == channel::kOperator) return decode<operator_t>(data, size).has_value();
+  return false;
 }
 
 }  // namespace ves

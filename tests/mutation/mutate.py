@@ -457,15 +457,16 @@ def measure_coverage():
     return tests
 
 
-def attack(record, tests):
-    """The first test that notices the mutant; the quickest tests first, a binary's together."""
+def attack(record, tests, before):
+    """The first test that notices the mutant: the one that did so last time, then the quickest."""
     covering = sorted((t for t in tests if record["id"] in t["seen"]), key=lambda t: t["seconds"])
     if not covering:
         return {**record, "killed_by": None, "covered": 0}
     by_binary = collections.OrderedDict()
     for t in covering:
         by_binary.setdefault(t["binary"], []).append(t)
-    for binary, some in by_binary.items():
+    last = [(t["binary"], [t]) for t in covering if t["name"] == before.get(key_of(record))]
+    for binary, some in last + list(by_binary.items()):
         allowed = 10.0 + 6.0 * sum(t["seconds"] for t in some)
         try:
             done = subprocess.run(
@@ -488,13 +489,15 @@ def run(args):
     results_file = WORK / "results.json"
     results = {r["id"]: r for r in json.loads(results_file.read_text())} \
         if results_file.exists() and args.which else {}
+    before = {key_of(r): r["killed_by"] for r in json.loads(results_file.read_text())} \
+        if results_file.exists() else {}
     wanted = set(args.which)
     chosen = [r for r in records if r["id"] not in dropped and
               (not wanted or str(r["id"]) in wanted or r["module"] in wanted or
                ("survivors" in wanted and not results.get(r["id"], {}).get("killed_by")))]
     tests = measure_coverage()
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-        for n, result in enumerate(pool.map(lambda r: attack(r, tests), chosen), start=1):
+        for n, result in enumerate(pool.map(lambda r: attack(r, tests, before), chosen), start=1):
             results[result["id"]] = result
             if not result["killed_by"]:
                 print(f"{result['id']:4} {result['file']}:{result['line']}: {result['what']}: "

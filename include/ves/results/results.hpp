@@ -13,6 +13,10 @@ namespace ves {
 
 /// Where a run leaves what it found. Throws InputError when the folder cannot be made.
 std::filesystem::path makeFolder(const std::filesystem::path& folder);
+/// The same, and this process's alone until it ends. Throws InputError while another one has it.
+std::filesystem::path claimFolder(const std::filesystem::path& folder);
+/// A folder of this name that did not exist before; or NAME-2, NAME-3, ... Claimed.
+std::filesystem::path claimNewFolder(const std::filesystem::path& folder);
 
 /// From folder/run.lcmlog: series.csv, summary.json, and the plots when wanted. Returns the table.
 std::string writeResults(const std::filesystem::path& folder, const RunResult& result, bool plots);

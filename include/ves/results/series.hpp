@@ -33,6 +33,7 @@ struct Series {
   Experiment experiment;
   std::string version;
   std::vector<Row> rows;
+  Damage damage;  // what of the log could not be used
 };
 
 /// Makes rows of the messages of a log, or of a bus, as they come.
@@ -50,7 +51,8 @@ class RowMaker {
   std::optional<std::int64_t> start_;  // [ns] of the first state
 };
 
-/// Throws InputError when the file is no log, or a log without its configuration.
+/// The first controller's run in a log. Damage is passed over and told. Throws InputError when the
+/// file is no log, or a log without its configuration or a tick.
 Series readSeries(const std::string& log);
 
 /// A column of the table; its name ends with its unit.

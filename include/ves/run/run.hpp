@@ -21,9 +21,12 @@ struct RunResult {
   Phase phase = Phase::kDisarmed;
   Check cause = Check::kCount;  // of a stop; or why it never armed
   std::int64_t cause_tick = -1;
-  bool aborted = false;   // the program could not go on: a calibration or a start was refused
-  bool let_go = false;    // asked to end before it was armed, or after a stop was reset
-  std::int64_t lost = 0;  // [-] log events and messages that could not be written or sent
+  bool aborted = false;        // the program could not go on: a calibration or a start was refused
+  bool let_go = false;         // asked to end before it was armed, or after a stop was reset
+  std::int64_t lost = 0;       // [-] messages that could not be sent, or were not heard
+  std::int64_t log_lost = 0;   // [-] events that could not be written
+  std::string log_trouble;     // why
+  std::int64_t malformed = 0;  // [-] messages on our channels that are none of ours; not recorded
 
   bool good() const { return (phase == Phase::kParked && !aborted) || let_go; }
 };
@@ -58,7 +61,7 @@ void runPlant(const Experiment& experiment, const ProcessOptions& options,
 
 struct LaunchOptions {
   ProcessOptions process;
-  std::filesystem::path program;  // `ves`, which is controller and plant too
+  std::filesystem::path program;   // `ves`, which is controller and plant too
   std::filesystem::path scenario;  // resolved experiment file, for both
   bool plant = true;               // ours too; else one is on the bus
 };

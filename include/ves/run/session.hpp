@@ -24,7 +24,7 @@ class Session {
 
   /// `f` sees every state of our controller.
   void onState(OnState f) { on_state_ = std::move(f); }
-  /// `f` sees every message on the bus, states included.
+  /// `f` sees every well-formed message on the bus, states included.
   void onMessage(OnMessage f) { on_message_ = std::move(f); }
 
   /// Handles what has arrived, waiting for at most so long, or until `descriptor` can be read:
@@ -56,6 +56,7 @@ class Session {
   Identity self_ = Identity::draw();
   Bus bus_;
   std::unique_ptr<LogWriter> log_;
+  std::string log_file_;
   std::int64_t start_;  // [ns]
   std::unique_ptr<Process> plant_, controller_;
   bool interrupted_ = false;

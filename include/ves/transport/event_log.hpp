@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// LCM event logs. Writing is LCM's; reading is ours, because LCM 1.3.1's reader crashes on damaged
-// files.
+// LCM event logs: a writer that keeps the file whole when the disk is full, and a reader that knows
+// what to do with damage (LCM 1.3.1's crashes on it).
 #pragma once
 
 #include <cstdint>
@@ -15,10 +15,6 @@
 
 #include "ves/transport/messages.hpp"
 
-namespace lcm {
-class LogFile;
-}
-
 namespace ves {
 
 class LogWriter {
@@ -26,8 +22,13 @@ class LogWriter {
   /// Throws InputError when the file cannot be written.
   explicit LogWriter(const std::string& path);
   ~LogWriter();
+  LogWriter(const LogWriter&) = delete;
+  LogWriter& operator=(const LogWriter&) = delete;
 
-  void write(const std::string& channel, const void* data, std::int64_t size, std::int64_t time_ns);
+  /// Reaches the file within half a second of the events' own time.
+  void write(const std::string& channel, const void* data, std::int64_t size,
+             std::int64_t time_ns) noexcept;
+  void flush() noexcept;
 
   template <typename Message>
   void write(const std::string& channel, const Message& message, std::int64_t time_ns) {
@@ -36,13 +37,21 @@ class LogWriter {
     write(channel, buffer_.data(), size, time_ns);
   }
 
-  /// Events that could not be written, a full disk for example. Control does not depend on it.
+  /// Events that could not be written. Control does not depend on it; what is in the file is whole.
   std::int64_t lost() const noexcept { return lost_; }
+  /// Why events were lost, as `No space left on device`; empty when none was.
+  std::string trouble() const;
 
  private:
-  std::unique_ptr<lcm::LogFile> file_;
-  std::vector<std::uint8_t> buffer_;
+  int file_ = -1;
+  std::vector<std::uint8_t> buffer_;   // one message
+  std::vector<std::uint8_t> waiting_;  // whole events
+  std::int64_t waiting_events_ = 0;    // [-]
+  std::int64_t events_ = 0;            // [-]
+  std::int64_t flushed_at_ = 0;        // [ns] events' time
+  std::int64_t whole_ = 0;             // [B] of the file
   std::int64_t lost_ = 0;
+  int error_ = 0;
 };
 
 struct LogEvent {
@@ -61,6 +70,9 @@ struct LogEvent {
     if (auto message = as<Message>()) return *std::move(message);
     refuse(log, Message::getTypeName());
   }
+
+  /// The words for bytes that are no such message.
+  std::string refusal(const std::string& log, const char* type) const;
 
  private:
   [[noreturn]] void refuse(const std::string& log, const char* type) const;
@@ -88,19 +100,38 @@ class Recent {
   std::deque<std::int64_t> order_;
 };
 
+/// What of a log could not be used, in words that begin with the file's name and the byte.
+class Damage {
+ public:
+  void add(const std::string& what);
+  bool any() const { return count_ > 0; }
+  /// The first few, and how many more.
+  std::vector<std::string> lines() const;
+  const std::string& first() const { return first_few_.front(); }
+
+ private:
+  static constexpr std::int64_t kFew = 5;
+  std::vector<std::string> first_few_;
+  std::int64_t count_ = 0;
+};
+
 class LogReader {
  public:
-  /// Throws InputError when there is no such file.
-  explicit LogReader(const std::string& path);
+  /// Throws InputError when there is no such file. With `damage` the reader passes over what is not
+  /// whole, to the next event, and says so there.
+  explicit LogReader(const std::string& path, Damage* damage = nullptr);
 
-  /// The next event; nothing at the end. Throws InputError, with the byte, where the file is no
-  /// log.
+  /// The next event; nothing at the end. Without `damage` throws InputError, with the byte, where
+  /// the file is no log.
   bool next(LogEvent& event);
 
  private:
+  bool read(LogEvent& event);
+  void seekNextEvent();
   [[noreturn]] void fail(std::int64_t offset, const std::string& what) const;
 
   std::string path_;
+  Damage* damage_;
   std::ifstream in_;
   std::int64_t size_ = 0;    // [B]
   std::int64_t offset_ = 0;  // [B]

@@ -67,4 +67,8 @@ std::optional<Message> decode(const void* data, std::int64_t size) {
 template <>
 std::optional<experiment_t> decode<experiment_t>(const void* data, std::int64_t size);
 
+/// Bytes that are exactly a message of this channel's type. Of another channel nothing is known:
+/// false.
+bool wellFormed(const std::string& channel, const void* data, std::int64_t size);
+
 }  // namespace ves

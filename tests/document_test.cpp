@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Files that a person gets wrong: one clear line each, whatever is in them.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "support/refusal.hpp"
+#include "support/rig.hpp"
+#include "ves/config/document.hpp"
+#include "ves/config/urdf.hpp"
+
+namespace ves {
+namespace {
+
+namespace fs = std::filesystem;
+
+using test::refusal;
+
+std::string parsed(const std::string& text) {
+  return refusal([&] { parseDocument(text, "a.yaml"); });
+}
+
+TEST(Document, IsUtf8) {
+  EXPECT_EQ(parsed("a: gr\xc3\xbc\xc3\x9f \xe2\x82\xac \xf0\x9f\xa6\xbe\n"), "");
+  for (const char* bad : {"\xff", "\xc3", "\xc0\xaf", "\xe0\x80\x80", "\xed\xa0\x80",
+                          "\xf5\x80\x80\x80", "\x80", "\xe2\x82"}) {
+    const std::string said = parsed(std::string("a: 1\nb: ") + bad + "\n");
+    EXPECT_EQ(said.find("a.yaml:2: byte 0x"), 0u) << said;
+  }
+}
+
+TEST(Document, IsOneDocument) {
+  EXPECT_EQ(parsed("# a comment\n---\na: 1\n"), "");
+  EXPECT_EQ(parsed("a: |\n  text\n  --- more\n"), "");
+  EXPECT_NE(parsed("a: 1\n---\nb: 2\n").find("a.yaml:2: a second YAML document"),
+            std::string::npos);
+}
+
+TEST(Document, HasNoMoreKeysThanAPersonWrites) {
+  std::string text;
+  for (int i = 0; i < 1001; ++i) text += fmt::format("k{}: 1\n", i);
+  EXPECT_NE(parsed(text).find("more than 1000 keys"), std::string::npos);
+}
+
+TEST(Document, ASlipInAKeyIsNamedAsOne) {
+  const Value value = parseDocument("amplitude_mm: 3\n", "a.yaml");
+  Section s(value, "sine");
+  EXPECT_EQ(refusal([&] { s.number("amplitude_m", 0.0, 1.0); }),
+            "a.yaml:1: sine.amplitude_mm: unknown key, did you mean amplitude_m?");
+}
+
+TEST(Overrides, ReachIntoListsAndReplaceBlocks) {
+  Value v = parseDocument("p: [{a: 1}, {b: {c: 2}}]\nq: {x: 1, y: 2}\n", "a.yaml");
+  applyOverride(v, "p.1.b.c=7");
+  EXPECT_EQ(v.find("p")->children[1].find("b")->find("c")->text, "7");
+  applyOverride(v, "p.0=3");
+  EXPECT_EQ(v.find("p")->children[0].text, "3");
+  applyOverride(v, "q.z=5");
+  EXPECT_EQ(v.find("q")->keys.size(), 3u);
+  for (const char* bad : {"p.2.a=1", "p.x=1", "p.-1=1", "p.1x=1"})
+    EXPECT_NE(refusal([&] { applyOverride(v, bad); }).find("want the number of an entry, 0 to 1"),
+              std::string::npos)
+        << bad;
+}
+
+class Files : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() / ("ves_document_" + std::to_string(getpid()));
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+  std::string put(const std::string& name, const std::string& text) {
+    std::ofstream(folder_ / name) << text;
+    return (folder_ / name).string();
+  }
+  fs::path folder_;
+};
+
+TEST_F(Files, ABlockMayReplaceAnInheritedOne) {
+  put("base.yaml", "base: {mass: 1, damping: 2}\n");
+  const auto keys = [&](const std::string& text) {
+    return loadDocument(put("mine.yaml", "from: base.yaml\n" + text)).find("base")->keys;
+  };
+  EXPECT_EQ(keys("base: {modes: 3}\n"), (std::vector<std::string>{"mass", "damping", "modes"}));
+  EXPECT_EQ(keys("base: !replace {modes: 3}\n"), std::vector<std::string>{"modes"});
+}
+
+const char* const kBrick =
+    "<robot name=\"brick\"><link name=\"base\"><inertial><mass value=\"20\"/><origin xyz=\"0 0 "
+    "0.2\"/><inertia ixx=\"0.5\" ixy=\"0\" ixz=\"0\" iyy=\"0.5\" iyz=\"0\" izz=\"0.3\"/></inertial>"
+    "</link></robot>\n";
+
+TEST_F(Files, ARobotComesByItsFile) {
+  const auto with = [](const std::string& set) {
+    return refusal([&] { test::unassessed("puma_on_table_4_1", {set}); });
+  };
+  EXPECT_EQ(with("robot.urdf=" + test::configDir() + "/robots/puma560.urdf"), "");
+  EXPECT_NE(with("robot.urdf=none.urdf").find("none.urdf: no such file"), std::string::npos);
+  const std::string file =
+      put("none.yaml",
+          "from: " + test::configDir() + "/scenarios/z_sine.yaml\nrobot: {mount_m: [0, 0, 0]}\n");
+  EXPECT_EQ(refusal([&] { loadExperiment(file); }),
+            file + ":2: robot.urdf: missing, want the robot's URDF file");
+}
+
+TEST_F(Files, ARobotMayBeARigidPayload) {
+  put("brick.urdf", kBrick);
+  const std::string robot =
+      "robot: {urdf: brick.urdf, adapter_position_m: [0, 0, 0.1], adapter: {mass_kg: 16, size_m: "
+      "[0.5, 0.5, 0.02]}, mount_m: [0, 0, 0.01], mount_rpy_deg: [0, 0, 0]";
+  const auto scenario = [&](const std::string& more) {
+    return put("brick.yaml", "from: " + test::configDir() + "/scenarios/free_decay.yaml\n" + robot +
+                                 more + "}\n");
+  };
+  const Experiment e = loadExperiment(
+      scenario(""), {"controller.stability=forced", "controller.stability_uncompensated=forced"});
+  EXPECT_EQ(e.controller.payload.robot.joints, 0);
+  EXPECT_DOUBLE_EQ(e.controller.payload.robot.base.mass, 20.0);
+  test::Rig rig(e);
+  rig.tick(Request::kStart);
+  EXPECT_EQ(rig.until(test::done).phase, Phase::kParked);
+  EXPECT_NE(refusal([&] {
+              loadExperiment(scenario(", joints_deg_or_m: [1]"));
+            }).find("has no joint that moves"),
+            std::string::npos);
+  EXPECT_EQ(refusal([&] { loadExperiment(scenario(", joints_deg_or_m: []")); }), "");
+}
+
+TEST(UrdfLimits, WhatIsMonstrousIsRefusedInOneLine) {
+  const auto said = [](const std::string& text) {
+    return refusal([&] { loadUrdf(text, "r.urdf"); });
+  };
+  ASSERT_EQ(said(kBrick), "");
+  const auto with = [](const std::string& what, const std::string& by) {
+    std::string text = kBrick;
+    return text.replace(text.find(what), what.size(), by);
+  };
+  EXPECT_NE(said(with("mass value=\"20\"", "mass value=\"1e308\"")).find("want a number in [0"),
+            std::string::npos);
+  EXPECT_NE(said(with("0 0 0.2", "0 0 1e308")).find("centre of mass"), std::string::npos);
+  EXPECT_NE(said(with("ixx=\"0.5\"", "ixx=\"1e308\"")).find("inertia"), std::string::npos);
+  std::string deep, wide = "<robot name=\"r\"";
+  for (int i = 0; i < 20'000; ++i) deep += "<a>";
+  for (int i = 0; i < 60'000; ++i) wide += fmt::format(" a{}=\"\"", i);
+  EXPECT_NE(said("<robot name=\"r\">" + deep).find("nested deeper than 64"), std::string::npos);
+  EXPECT_NE(said(wide + "/>").find("want at most 8192"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace ves
