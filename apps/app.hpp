@@ -72,6 +72,7 @@ struct Options {
   std::int64_t seed = -1;
   std::string calibration, masses, servo;
   bool force = false;
+  bool verbose = false, quiet = false;
   bool private_bus = false;
   ProcessOptions process;
 
@@ -85,6 +86,7 @@ struct Options {
     cli.add_option("--masses", masses, "file that an identification has left, for the controller");
     cli.add_option("--servo", servo,
                    "file that a servo identification has left, for the controller");
+    cli.add_flag("--verbose", verbose, "also what is known to be odd in the robot's file");
   }
   void addForce(CLI::App& cli) {
     cli.add_flag("--force", force, "admittance control even where it would diverge");
@@ -131,6 +133,16 @@ inline std::filesystem::path ownProgram() {
   return std::filesystem::read_symlink("/proc/self/exe");
 }
 
+/// One line that a person can read, whatever was quoted in it.
+inline std::string shortened(std::string text) {
+  constexpr std::size_t kHead = 300, kTail = 200;
+  while (!text.empty() && text.back() == '\n') text.pop_back();
+  std::replace_if(
+      text.begin(), text.end(), [](char c) { return c == '\n' || c == '\r'; }, ' ');
+  if (text.size() <= kHead + kTail) return text;
+  return text.substr(0, kHead) + " ... " + text.substr(text.size() - kTail);
+}
+
 /// Parses, runs, and turns bad input into one line and status 2.
 inline int run(CLI::App& cli, int argc, char** argv, const std::function<int()>& body) {
   if (argc == 2 && std::string_view(argv[1]) == kWords) {
@@ -141,7 +153,7 @@ inline int run(CLI::App& cli, int argc, char** argv, const std::function<int()>&
     cli.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return cli.exit(error);  // --help
-    fmt::print(stderr, "{}: {} (see --help)\n", cli.get_name(), error.what());
+    fmt::print(stderr, "{}: {} (see --help)\n", cli.get_name(), shortened(error.what()));
     return kBadInput;
   }
   try {
@@ -151,7 +163,7 @@ inline int run(CLI::App& cli, int argc, char** argv, const std::function<int()>&
       throw InputError(fmt::format("standard output: {}", std::strerror(errno)));
     return status;
   } catch (const std::exception& error) {
-    fmt::print(stderr, "{}: {}\n", cli.get_name(), error.what());
+    fmt::print(stderr, "{}: {}\n", cli.get_name(), shortened(error.what()));
     return kBadInput;
   }
 }
@@ -160,7 +172,9 @@ inline void printDamage(const Damage& damage) {
   for (const std::string& line : damage.lines()) fmt::print(stderr, "warning: {}\n", line);
 }
 
-inline void printWarnings(const Experiment& experiment) {
+inline void printWarnings(const Experiment& experiment, bool verbose = false) {
+  if (verbose)
+    for (const std::string& note : experiment.notes) fmt::print(stderr, "note: {}\n", note);
   for (const std::string& warning : experiment.warnings)
     fmt::print(stderr, "warning: {}\n", warning);
   if (experiment.calibration && age(*experiment.calibration) > kCalibrationKeeps)

@@ -32,7 +32,10 @@ int serve(ControllerOptions& options) {
   });
   if (result.good()) return kDone;
   if (result.phase == Phase::kDisarmed)
-    fmt::print(stderr, "ves controller: not armed: {}\n", name(result.cause));
+    fmt::print(
+        stderr, "ves controller: not armed: {}{}\n",
+        result.cause == Check::kCount ? "no stream of new samples long enough" : name(result.cause),
+        result.rejected.empty() ? "" : "; " + result.rejected);
   else if (result.phase == Phase::kStopped)
     fmt::print(stderr, "ves controller: stopped by the {} check in tick {}\n", name(result.cause),
                result.cause_tick);
@@ -61,7 +64,7 @@ int console(ControllerOptions& options) {
   console.commands = options.commands;
   console.stop = [] { return stop_requested != 0; };
   Experiment experiment = options.load();
-  printWarnings(experiment);
+  printWarnings(experiment, options.verbose);
   const std::string why = applyStabilityCheck(experiment);
   if (!why.empty()) fmt::print(stderr, "warning: {}\n", why);
   catchSignals();

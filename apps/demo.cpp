@@ -15,6 +15,7 @@ int demoCommand(int argc, char** argv) {
   options.scenario = "puma_on_table_4_1";
   cli.add_option("--out", options.out, "folder for the results; a new one in ves-runs by default");
   options.addBus(cli);
+  cli.add_flag("--quiet", options.quiet, "no progress and no table; warnings and errors only");
   return run(cli, argc, argv, [&] { return runExperiment(options); });
 }
 

@@ -132,6 +132,8 @@ int doctorCommand(int argc, char** argv) {
       fmt::print("BAD    a run of our own did not end well: try ./ves demo\n");
       return kTripped;
     }
+    if (const std::string rejected = loop.value("samples_rejected", ""); !rejected.empty())
+      fmt::print("       {}\n", rejected);
     fmt::print("       {} of {} ticks missed\n", loop["ticks_missed"].get<std::int64_t>(),
                loop["ticks"].get<std::int64_t>());
     return bad ? kTripped : kDone;

@@ -17,6 +17,7 @@ int runCommand(int argc, char** argv) {
   options.addBus(cli);
   cli.add_option("--out", options.out, "folder for the results; a new one in ves-runs by default");
   cli.add_flag("--two-processes", options.two_processes, "in lockstep too, over the bus");
+  cli.add_flag("--quiet", options.quiet, "no progress and no table; warnings and errors only");
   cli.add_flag("!--no-plots", options.plots, "leave the plots out");
   return run(cli, argc, argv, [&] { return runExperiment(options); });
 }

@@ -61,13 +61,15 @@ inline void prepareBus(RunnerOptions& options, bool alone) {
 
 /// A recording that is not whole is no success.
 inline int statusOf(const RunResult& result) {
-  if (result.log_lost > 0) return kBadInput;
+  if (result.log_lost > 0)
+    throw InputError(fmt::format("run.lcmlog: {}: {} events of the log lost", result.log_trouble,
+                                 result.log_lost));
   return result.good() ? kDone : kTripped;
 }
 
 inline int runExperiment(RunnerOptions& options) {
   Experiment experiment = options.load();
-  printWarnings(experiment);
+  printWarnings(experiment, options.verbose);
   requireStability(experiment);
   LaunchOptions launch = prepareFolder(options, experiment);
   catchSignals();
@@ -79,7 +81,7 @@ inline int runExperiment(RunnerOptions& options) {
     result = runLockstep(experiment, &writer, [&](const TickState& state) {
       double x[6];
       Vec6::Map(x) = state.motion.x;
-      progress.show(state.phase, state.segment, state.tick, x);
+      if (!options.quiet) progress.show(state.phase, state.segment, state.tick, x);
       return stop_requested ? Order{Request::kStop, {}, {}} : Order();
     });
   } else {
@@ -88,12 +90,14 @@ inline int runExperiment(RunnerOptions& options) {
     result = runProcesses(
         experiment, launch,
         [&](const state_t& s) {
-          progress.show(static_cast<Phase>(s.phase), s.segment, s.header.sequence, s.x);
+          if (!options.quiet)
+            progress.show(static_cast<Phase>(s.phase), s.segment, s.header.sequence, s.x);
         },
         [] { return stop_requested != 0; });
   }
   progress.end();
-  fmt::print("{}", writeResults(launch.scenario.parent_path(), result, options.plots));
+  const std::string table = writeResults(launch.scenario.parent_path(), result, options.plots);
+  if (!options.quiet) fmt::print("{}", table);
   return statusOf(result);
 }
 

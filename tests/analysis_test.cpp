@@ -134,8 +134,7 @@ std::vector<Setting> settings(int count) {
           "base.arm.stiffness_scale=" + between(0.4, 2.0),
           "controller.period_ns=" + pick({"8000000", "10000000", "13333333"}),
           "legs.K_P=" + pick({"6000", "8500", "11000"}), "sensor.cutoff_hz=" + between(15.0, 40.0),
-          "legs.filter_cutoff_rad_per_s=" + between(25.0, 50.0),
-          "legs.K_D=" + pick({"0", "0", "1500"})}});
+          "legs.filter_cutoff_rad_per_s=" + between(25.0, 50.0)}});
   return out;
 }
 

@@ -109,6 +109,23 @@ TEST(BodyOnTheBase, LosesNoEnergyThatTheBaseDoesNot) {  // undamped: for minutes
   EXPECT_LT(high, 1.01 * first);
 }
 
+TEST(Ahead, AFreeRunIsThatFromRestWhereItWasReset) {
+  for (const bool coupled : {false, true}) {
+    ModalModel m = base(6);
+    if (coupled) m.damping += 0.3 * MatrixXd::Ones(6, 6);
+    AdmittanceModel model(m, 0.01, 0.02);
+    VectorXd z = VectorXd::Zero(12);
+    z.head(6) = VectorXd::LinSpaced(6, 0.1, -0.2);
+    model.reset(m.Phi * z.head(6));
+    for (int n = 0; n < 100; ++n) {
+      model.step({}, Mat6::Zero(), 1.0);
+      z = exact(m, Mat6::Zero(), z, Vec6::Zero(), 0.01);
+      ASSERT_LT((model.motion().x - m.Phi * z.head(6)).norm(), 1e-10) << n << coupled;
+      ASSERT_LT((model.motion().x_dot - m.Phi * z.tail(6)).norm(), 1e-9) << n << coupled;
+    }
+  }
+}
+
 TEST(Ahead, AHeavilyDampedModeStartsWhereItIs) {  // its way back would be longer than the world
   ModalModel m = base(6);
   m.damping(0, 0) = 2000.0;

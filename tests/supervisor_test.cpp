@@ -174,6 +174,18 @@ TEST(Supervisor, APathIsCheckedOverSomeTicksBeforeItBegins) {
   for (int n = 0; n < 20; ++n) EXPECT_NE(tripped.advance().phase, Phase::kRunning);
 }
 
+TEST(Supervisor, AHoldIsAMoveThatBrakes) {
+  Desk desk(puma());
+  desk.arm();
+  desk.order(Request::kRun, test::sine(2, 0.1, 0.5, 0.9));
+  for (int n = 0; n < 20; ++n) desk.advance();
+  EXPECT_EQ(desk.motion.kind(), SegmentKind::kTrajectory);
+  desk.order(Request::kHold);
+  EXPECT_EQ(desk.motion.kind(), SegmentKind::kMove);
+  for (int n = 0; n < 100; ++n) desk.advance();
+  EXPECT_EQ(desk.motion.motion().x_dot, Vec6::Zero());
+}
+
 TEST(Supervisor, ASecondTripOfATickIsLatchedAndTheFirstCauseStays) {
   Desk desk(puma());
   desk.arm();

@@ -191,6 +191,12 @@ void resolve(Value& value, const std::filesystem::path& directory, int depth) {
 
 Value parse(const std::string& text, const std::string& name) {
   requireUtf8(text, name);
+  // Before the parser needs seconds and a gigabyte for it.
+  const auto marks = std::count_if(text.begin(), text.end(), [](char c) {
+    return c == '\n' || c == ',' || c == '[' || c == '{';
+  });
+  if (marks > 2 * kMaxValues)
+    throw InputError(fmt::format("{}: more than {} values", name, kMaxValues));
   try {
     requireOneDocument(text, name);
     return Converter(name).convert(YAML::Load(text));

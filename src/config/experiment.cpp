@@ -9,9 +9,11 @@
 
 #include "readers.hpp"
 #include "ves/analysis/gate.hpp"
+#include "ves/base/coordinates.hpp"
 #include "ves/config/base.hpp"
 #include "ves/config/masses.hpp"
 #include "ves/config/servo.hpp"
+#include "ves/control/gravity_compensation.hpp"
 #include "ves/plant/nominal_servo.hpp"
 
 namespace ves {
@@ -31,6 +33,30 @@ std::string setupOf(const Value& document) {
   for (const char* key : {"sensor", "robot", "gravity_m_per_s2", "masses"})
     if (const Value* value = document.find(key)) text += emit(*value);
   return fingerprint(text);
+}
+
+/// Warns of channels that the weight alone nearly fills, in the robot's poses and level.
+void warnOfFullChannels(Experiment& e) {
+  constexpr double kMostShare = 0.9, kFullScale = 32767.0;  // [-], [count]
+  const Mat6 S_proc = e.plant.sensor.S_proc();
+  std::vector<JointVector> poses = {e.plant.initial_joints};
+  for (const plant::RobotEvent& event : e.plant.robot_events) {
+    poses.push_back(poses.back());
+    poses.back()(event.move.joint) = event.move.target;
+  }
+  Vec6 most = Vec6::Zero();
+  const Mat3 R = e.plant.geometry.fromHome(e.plant.initial_pose).R;
+  for (const JointVector& q : poses)
+    for (const Mat3& attitude : {Mat3(Mat3::Identity()), R})
+      most = most.cwiseMax(
+          (S_proc * staticWrench(e.plant.payload, q, attitude, e.plant.gravity).stacked())
+              .cwiseAbs());
+  for (int i = 0; i < 6; ++i)
+    if (most(i) > kMostShare * kFullScale)
+      e.warnings.push_back(fmt::format(
+          "the weight alone takes {:.0f} % of the range of channel {}; a smaller sensor.gain[{}] "
+          "would leave room",
+          100.0 * most(i) / kFullScale, wrenchComponent(i).name, i));
 }
 
 Experiment build(const Value& document) {
@@ -82,7 +108,7 @@ Experiment build(const Value& document) {
     c.payload.robot = urdf.model;
     p.initial_joints = robot.q;
     out.joint_names = urdf.joint_names;
-    out.warnings = urdf.warnings;
+    out.notes = urdf.warnings;
   }
 
   p.geometry = c.geometry;
@@ -133,6 +159,7 @@ Experiment build(const Value& document) {
 
   readProgram(root, has_robot ? &urdf : nullptr, out);
   root.finish();
+  warnOfFullChannels(out);
   out.substitutes = countSubstitutes(document, false);
   out.resolved = emit(document);
   out.hash = fingerprint(out.resolved);

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <utility>
 
+#include "evidence.hpp"
 #include "ves/base/coordinates.hpp"
 #include "ves/realtime/latency.hpp"
 #include "ves/results/comparison.hpp"
@@ -194,6 +195,9 @@ void addTiming(const Series& series, nlohmann::ordered_json& out) {
   out["ticks_missed"] = last->missed;
   out["ticks_missed_woke_late"] = last->missed_woke_late;
   out["ticks_missed_ran_long"] = last->missed_ran_long;
+  out["samples_rejected"] = Rejections{last->samples_malformed, last->samples_out_of_range,
+                                       last->samples_of_another, last->samples_old}
+                                .text();
 }
 
 }  // namespace
@@ -214,6 +218,10 @@ nlohmann::ordered_json summarise(const Series& series, const RunResult& result) 
   }
   out["first_cause"] = name(result.cause);
   out["first_cause_tick"] = result.cause_tick;
+  for (const Row& row : series.rows)
+    if (row.state.header.sequence == result.cause_tick ||
+        (result.phase == Phase::kDisarmed && &row == &series.rows.back()))
+      out["first_cause_evidence"] = evidence(result.cause, row, series.experiment);
   out["ticks"] = result.ticks;
   out["simulated_s"] = result.simulated;
   out["wall_s"] = result.wall;
@@ -248,14 +256,18 @@ std::string table(const nlohmann::ordered_json& s) {
   if (s["messages_malformed"].get<std::int64_t>() > 0)
     out += fmt::format("  {} malformed messages on the bus, not recorded\n",
                        s["messages_malformed"].get<std::int64_t>());
+  std::string cause = s["first_cause"].get<std::string>();
+  if (const std::string why = s.value("first_cause_evidence", ""); !why.empty())
+    cause += fmt::format(" ({})", why);
   if (s["ended"] == name(Phase::kDisarmed))
-    out +=
-        fmt::format("  never armed: {}\n", s["first_cause"] == name(Check::kCount)
-                                               ? std::string("no stream of new samples long enough")
-                                               : s["first_cause"].get<std::string>());
+    out += fmt::format("  never armed: {}\n", s["first_cause"] == name(Check::kCount)
+                                                  ? "no stream of new samples long enough"
+                                                  : cause);
   if (!s["trips"].empty())
     out += fmt::format("  stopped in tick {} by: {}\n", s["first_cause_tick"].get<std::int64_t>(),
-                       s["first_cause"].get<std::string>());
+                       cause);
+  if (const std::string rejected = s.value("samples_rejected", ""); !rejected.empty())
+    out += fmt::format("  {}\n", rejected);
   bool head = false;
   for (int i = 0; i < 6; ++i) {
     const std::string c(coordinate(i).name), unit(coordinate(i).unit);

@@ -18,6 +18,7 @@ constexpr int kAnswerTime = 200;                    // [ms] lockstep, before a m
 constexpr std::int64_t kLongestLeap = 100'000'000;  // [-] ticks that a command may pass over
 constexpr int kAnswerTries = 50;                    // [-] before the other side counts as gone
 constexpr std::int64_t kFirstSampleTime = 10'000'000'000;  // [ns]
+constexpr std::int64_t kWorthAWord = 2'000'000'000;        // [ns]
 
 /// Counts the times of this tick into the histograms.
 void count(timing_t& t) noexcept {
@@ -115,10 +116,16 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
   }
 
   enableRealtime("controller", kControllerPriority, options.realtime);
-  while (link.sample().sequence < 0) {
+  for (bool told = false; link.sample().sequence < 0;) {
     if (wantsOut()) return letGo();
+    if (!told && monotonicNow() - start > kWorthAWord) {
+      told = true;
+      fmt::print(stderr, "controller: waiting for a machine on {}\n", options.url);
+    }
     if (monotonicNow() - start > kFirstSampleTime)
-      throw InputError(fmt::format("bus {}: no machine to be heard", options.url));
+      throw InputError(fmt::format(
+          "bus {}: no machine to be heard{}", options.url,
+          link.samplesRejected().total() > 0 ? "; " + link.samplesRejected().text() : ""));
     bus.wait(100);
   }
   Ticker ticker(experiment.controller.period);
@@ -155,12 +162,18 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
     timing.sample_age_ns = woke - sample_time;
     timing.sample_to_command_ns = sent - sample_time;
     timing.missed = ticker.missed();
+    timing.samples_malformed = link.samplesRejected().malformed;
+    timing.samples_out_of_range = link.samplesRejected().out_of_range;
+    timing.samples_of_another = link.samplesRejected().of_another;
+    timing.samples_old = link.samplesRejected().old;
     (ran_long ? timing.missed_ran_long : timing.missed_woke_late) += missed;
     count(timing);
     bus.publish(channel::kTiming, timing);
     if (finish(state)) break;
   }
-  return monitor.result(monotonicNow() - start);
+  RunResult result = monitor.result(monotonicNow() - start);
+  result.rejected = link.samplesRejected().text();
+  return result;
 }
 
 void runPlant(const Experiment& experiment, const ProcessOptions& options,

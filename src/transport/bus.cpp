@@ -105,6 +105,17 @@ bool busWorks(const std::string& url) {
   return lcm.good() && echoes(lcm);
 }
 
+std::string Rejections::text() const {
+  if (total() == 0) return {};
+  std::string causes;
+  for (const auto& [count, cause] : {std::pair{malformed, "malformed or of another schema"},
+                                     {out_of_range, "with a value out of range or not a number"},
+                                     {of_another, "of another or an earlier machine (epoch)"},
+                                     {old, "of an earlier sequence"}})
+    if (count > 0) causes += fmt::format("{}{} {}", causes.empty() ? "" : ", ", count, cause);
+  return fmt::format("{} samples not let in: {}", total(), causes);
+}
+
 ControllerLink::ControllerLink(Bus& bus, const Identity& self) : bus_(bus), self_(self) {
   bus.subscribe(channel::kSample, [this](const std::string&, const void* data, std::uint32_t size) {
     const auto message = decode<sample_t>(data, size);
@@ -113,8 +124,13 @@ ControllerLink::ControllerLink(Bus& bus, const Identity& self) : bus_(bus), self
         message && message->header.source == plant_.source && message->header.epoch == plant_.epoch;
     const bool renewed = message && !same && !engaged_ && message->header.epoch > plant_.epoch;
     if (sample && !same && !renewed) conflict_ = true;
-    if (!sample || !(renewed || (same && sample->sequence >= sample_.sequence))) {
+    const bool newer = same && sample && sample->sequence >= sample_.sequence;
+    if (!sample || !(renewed || newer)) {
       ++rejected_;
+      ++(!message  ? samples_rejected_.malformed
+         : !sample ? samples_rejected_.out_of_range
+         : !same   ? samples_rejected_.of_another
+                   : samples_rejected_.old);
       return;
     }
     plant_ = {message->header.source, message->header.epoch};

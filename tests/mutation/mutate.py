@@ -451,7 +451,8 @@ def measure_coverage():
         tests = list(pool.map(cover, all_tests()))
     failing = [t["name"] for t in tests if t["status"] != 0]
     if failing:
-        sys.exit(f"without any mutant these fail: {failing}")
+        print(f"left out, because they fail without any mutant: {failing}", flush=True)
+    tests = [t for t in tests if t["status"] == 0]
     (WORK / "coverage.json").write_text(json.dumps(tests))
     print(f"{len(tests)} tests in {sum(t['seconds'] for t in tests):.0f} s")
     return tests

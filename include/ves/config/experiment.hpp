@@ -27,6 +27,7 @@ struct Experiment {
   plant::PlantConfig plant;
   std::vector<std::string> joint_names;
   std::vector<std::string> warnings;
+  std::vector<std::string> notes;  // known oddities of a robot's file
   std::optional<CalibrationRecord> calibration;  // that the bias comes from
   std::string setup;     // hash of what a calibration depends on: sensor, robot, gravity
   int substitutes = 0;   // [-] numbers that stand in for unknown ones

@@ -28,6 +28,8 @@ struct RunResult {
   std::string log_trouble;     // why
   std::int64_t malformed = 0;  // [-] messages on our channels that are none of ours; not recorded
 
+  std::string rejected;  // samples that the controller did not let in, by cause
+
   bool good() const { return (phase == Phase::kParked && !aborted) || let_go; }
 };
 

@@ -69,6 +69,18 @@ bool busWorks(const std::string& url);
 /// multicast: nothing leaks out or in. Call before any thread starts. Throws InputError.
 void enterPrivateBus();
 
+/// Samples that were not let in, by cause.
+struct Rejections {
+  std::int64_t malformed = 0;     // [-] no message of this schema
+  std::int64_t out_of_range = 0;  // [-] a value out of range, or not a number
+  std::int64_t of_another = 0;    // [-] of another machine, or an earlier one (epoch)
+  std::int64_t old = 0;           // [-] of an earlier sequence than one before
+
+  std::int64_t total() const { return malformed + out_of_range + of_another + old; }
+  /// As "3 samples not let in: 2 malformed, 1 old"; empty when all were.
+  std::string text() const;
+};
+
 /// The controller's side: the newest sample, the operator's orders, whether somebody else is there.
 ///
 /// A machine that was started anew takes the place of the old one while nothing is engaged. From
@@ -86,6 +98,7 @@ class ControllerLink {
   Order takeOrder() noexcept;
   bool takeConflict() noexcept { return std::exchange(conflict_, false); }
   std::int64_t rejected() const noexcept { return rejected_; }  // [-] messages not let in
+  const Rejections& samplesRejected() const noexcept { return samples_rejected_; }
 
   void send(const leg_command_t& command) noexcept;
 
@@ -106,6 +119,7 @@ class ControllerLink {
   std::size_t next_known_ = 0;
   bool conflict_ = false;
   std::int64_t rejected_ = 0;
+  Rejections samples_rejected_;
 };
 
 /// The machine's side: the newest command of the one controller that has the legs.

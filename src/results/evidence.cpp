@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evidence.hpp"
+
+#include <fmt/format.h>
+
+#include "ves/base/coordinates.hpp"
+
+namespace ves {
+namespace {
+
+std::string legOutside(const Row& row, const SafetyLimits& limits) {
+  for (int i = 0; i < kLegs; ++i) {
+    const double L = row.state.leg[i];
+    if (L >= limits.leg_min && L <= limits.leg_max) continue;
+    return fmt::format("leg {} at {:.4f} m, want [{}, {}] (safety.leg_min_m, leg_max_m)", i + 1, L,
+                       limits.leg_min, limits.leg_max);
+  }
+  return {};
+}
+
+std::string coordinateOutside(const Row& row, const SafetyLimits& limits) {
+  for (int i = 0; i < 6; ++i) {
+    const double most = i < 3 ? limits.translation : limits.rotation, x = row.state.x[i];
+    if (std::abs(x) <= most) continue;
+    const Coordinate& c = coordinate(i);
+    return fmt::format("{} at {:.1f} {}, want at most {:.1f} (safety.{})", c.name, x * c.shown,
+                       c.shown_unit, most * c.shown, i < 3 ? "translation_m" : "rotation_deg");
+  }
+  return {};
+}
+
+/// The two legs that are nearest, and the leg that lies flattest on a plate.
+std::string legsTooClose(const Row& row, const Experiment& e) {
+  const Geometry& g = e.controller.geometry;
+  const SafetyLimits& limits = e.controller.safety;
+  const Transform X_IP = g.fromHome(Pose::from(Vec6::Map(row.state.x)));
+  double least = HUGE_VAL, flattest = HUGE_VAL;
+  std::size_t a = 0, b = 0, flat = 0;
+  for (std::size_t i = 0; i < kLegs; ++i) {
+    const Vec3 end = X_IP * g.p_PPi_P[i], along = (end - g.p_IBi_I[i]).normalized();
+    const double sine = std::min(along.z(), along.dot(X_IP.R.col(2)));
+    if (sine < flattest) flattest = sine, flat = i;
+    for (std::size_t j = i + 1; j < kLegs; ++j) {
+      const double d = segmentDistance(g.p_IBi_I[i], end, g.p_IBi_I[j], X_IP * g.p_PPi_P[j]);
+      if (d < least) least = d, a = i, b = j;
+    }
+  }
+  if (!(least >= limits.leg_clearance))
+    return fmt::format("legs {} and {} are {:.1f} mm apart, want {:.1f} (safety.leg_clearance_m)",
+                       a + 1, b + 1, least * 1e3, limits.leg_clearance * 1e3);
+  return fmt::format("leg {} is {:.1f} deg from a plate, want {:.1f} (safety.plate_angle_deg)",
+                     flat + 1, std::asin(std::clamp(flattest, -1.0, 1.0)) / kDegree,
+                     limits.plate_angle / kDegree);
+}
+
+std::string legBehind(const Row& row, const SafetyLimits& limits) {
+  int worst = 0;
+  double most = -1.0;
+  for (int i = 0; i < kLegs; ++i)
+    if (const double off = std::abs(row.state.leg[i] - row.state.leg_measured[i]); off > most)
+      most = off, worst = i;
+  return fmt::format(
+      "leg {} is {:.1f} mm from its command (safety.position_error_still_m {:.1f} mm, more with "
+      "speed, at most {:.1f})",
+      worst + 1, most * 1e3, limits.position_error_still * 1e3, limits.position_error * 1e3);
+}
+
+std::string pressure(const Row& row, const Experiment& e) {
+  const double volts = e.plant.sensor.volts_per_count;
+  return fmt::format("{:.2f} V, want [{:.2f}, {:.2f}] (safety.pressure_min_v, pressure_max_v)",
+                     row.sample.adc[kWrenchChannels] * volts,
+                     e.controller.safety.pressure_min * volts,
+                     e.controller.safety.pressure_max * volts);
+}
+
+std::string saturated(const Row& row) {
+  for (int i = 0; i < kWrenchChannels; ++i)
+    if (row.sample.adc[i] <= -32768 || row.sample.adc[i] >= 32767)
+      return fmt::format("channel {} at {} counts: choose a smaller gain (sensor.gain)",
+                         wrenchComponent(i).name, row.sample.adc[i]);
+  return {};
+}
+
+}  // namespace
+
+std::string evidence(Check check, const Row& row, const Experiment& e) {
+  const SafetyLimits& limits = e.controller.safety;
+  switch (check) {
+    case Check::kActuatorLimits: return legOutside(row, limits);
+    case Check::kMotionLimits: return coordinateOutside(row, limits);
+    case Check::kCollide: return legsTooClose(row, e);
+    case Check::kPositionError: return legBehind(row, limits);
+    case Check::kPressure: return row.has_sample ? pressure(row, e) : "";
+    case Check::kSensorSaturated: return row.has_sample ? saturated(row) : "";
+    default: return {};
+  }
+}
+
+}  // namespace ves
