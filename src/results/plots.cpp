@@ -3,6 +3,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <functional>
+#include <iterator>
+
 #include "ves/base/coordinates.hpp"
 #include "ves/results/drift_samples.hpp"
 #include "ves/results/gnuplot.hpp"
@@ -17,24 +21,22 @@ struct Span {
 };
 
 struct Curve {
-  std::string formula;  // gnuplot, of the columns of series.csv
+  std::function<double(const Row&)> value;
   std::string title;
   std::string colour;
   bool dashed = false;
 };
 
-std::string scaled(const std::string& column, double factor) {
-  return fmt::format("column('{}')*{}", column, factor);
-}
-
-/// A picture of panels, as a gnuplot script.
+/// A picture of panels, as a gnuplot script. Every curve brings its own points: gnuplot would read
+/// series.csv once for each.
 class Page {
  public:
-  Page(const std::string& file, const std::string& title, Span span, int rows, int cols)
-      : panels_(rows * cols), cols_(cols) {
+  Page(const Series& series, const std::string& file, const std::string& title, Span span, int rows,
+       int cols)
+      : series_(series), span_(span), panels_(rows * cols), cols_(cols) {
     script_ = fmt::format(
-        "reset\nset datafile separator ','\nset datafile columnheaders\n"
-        "set terminal pngcairo noenhanced size 1500,{} font 'DejaVu Sans,12' background '#ffffff'\n"
+        "reset\nset terminal pngcairo noenhanced size 1500,{} font 'DejaVu Sans,12' background "
+        "'#ffffff'\n"
         "set output {}\n"
         "set multiplot layout {},{} title {} font 'DejaVu Sans,13' margins 0.06,0.985,{},0.90 "
         "spacing 0.06,0.09\n"
@@ -47,19 +49,27 @@ class Page {
 
   void panel(const std::string& ylabel, const std::vector<Curve>& curves) {
     const bool bottom = ++drawn_ > panels_ - cols_;
+    for (std::size_t i = 0; i < curves.size(); ++i) {
+      fmt::format_to(std::back_inserter(script_), "$curve{} << EOD\n", i);
+      for (const Row& row : series_.rows)
+        if (row.t >= span_.from && row.t <= span_.to)
+          fmt::format_to(std::back_inserter(script_), "{} {}\n", row.t, curves[i].value(row));
+      script_ += "EOD\n";
+    }
     script_ += fmt::format("set ylabel {} offset 1\nset xlabel {}\nplot ", quoted(ylabel),
                            quoted(bottom ? "time [s]" : ""));
     for (std::size_t i = 0; i < curves.size(); ++i)
-      script_ += fmt::format(
-          "{}'series.csv' using (column('t_s')):({}) with lines lw {} dt {} lc rgb '{}' title {}",
-          i ? ", " : "", curves[i].formula, curves[i].dashed ? 1.5 : 2.0, curves[i].dashed ? 2 : 1,
-          curves[i].colour, quoted(curves[i].title));
+      script_ += fmt::format("{}$curve{} with lines lw {} dt {} lc rgb '{}' title {}",
+                             i ? ", " : "", i, curves[i].dashed ? 1.5 : 2.0,
+                             curves[i].dashed ? 2 : 1, curves[i].colour, quoted(curves[i].title));
     script_ += "\n";
   }
 
   std::string script() const { return script_ + "unset multiplot\nunset output\n"; }
 
  private:
+  const Series& series_;
+  Span span_;
   std::string script_;
   int panels_, cols_, drawn_ = 0;
 };
@@ -137,6 +147,14 @@ std::vector<std::filesystem::path> drawPlots(const Series& series,
                                     kSecondPerNanosecond;  // the bias counts from the next tick
   }
 
+  const std::vector<Column> all = columns(experiment);
+  const auto column = [&](const std::string& name) {
+    return std::find_if(all.begin(), all.end(), [&](const Column& c) { return c.name == name; })
+        ->value;
+  };
+  const auto scaled = [&](const std::string& name, double factor) {
+    return [value = column(name), factor](const Row& row) { return value(row) * factor; };
+  };
   const auto name = [](int i, const char* what) {
     return fmt::format("{}_{}_{}", coordinate(i).name, what, coordinate(i).unit);
   };
@@ -147,7 +165,8 @@ std::vector<std::filesystem::path> drawPlots(const Series& series,
     script += page.script();
   };
 
-  Page pose("pose.png", experiment.name + ": pose of the platform, from home", program, 2, 3);
+  Page pose(series, "pose.png", experiment.name + ": pose of the platform, from home", program, 2,
+            3);
   for (int i = 0; i < 6; ++i) {
     const double scale = coordinate(i).shown;
     pose.panel(fmt::format("{} [{}]", coordinate(i).name, coordinate(i).shown_unit),
@@ -156,33 +175,34 @@ std::vector<std::filesystem::path> drawPlots(const Series& series,
   }
   finish("pose.png", pose);
 
-  Page error("error.png", experiment.name + ": commanded minus actual pose", program, 1, 2);
+  Page error(series, "error.png", experiment.name + ": commanded minus actual pose", program, 1, 2);
   for (int half = 0; half < 2; ++half) {
     std::vector<Curve> curves;
     for (int i = 3 * half; i < 3 * half + 3; ++i)
-      curves.push_back({fmt::format("(column('{}')-column('{}'))*{}", name(i, "desired"),
-                                    name(i, "actual"), coordinate(i).shown),
-                        std::string(coordinate(i).name), kColour[i % 3], false});
+      curves.push_back(
+          {[to = column(name(i, "desired")), from = column(name(i, "actual")),
+            scale = coordinate(i).shown](const Row& row) { return (to(row) - from(row)) * scale; },
+           std::string(coordinate(i).name), kColour[i % 3], false});
     error.panel(half ? "orientation error [deg]" : "position error [mm]", curves);
   }
   finish("error.png", error);
 
   if (calibrated.from >= 0.0) {
-    Page wrench("wrench.png",
+    Page wrench(series, "wrench.png",
                 experiment.name + ": wrench on the platform, gravity compensated, about {P} in {I}",
                 calibrated, 1, 2);
     for (int half = 0; half < 2; ++half) {
       std::vector<Curve> curves;
       for (int i = 3 * half; i < 3 * half + 3; ++i)
-        curves.push_back({fmt::format("column('{}_dynamic_{}')", wrenchComponent(i).name,
-                                      wrenchComponent(i).unit),
-                          std::string(wrenchComponent(i).name), kColour[i % 3], false});
+        curves.push_back(
+            {column(fmt::format("{}_dynamic_{}", wrenchComponent(i).name, wrenchComponent(i).unit)),
+             std::string(wrenchComponent(i).name), kColour[i % 3], false});
       wrench.panel(half ? "moment [N m]" : "force [N]", curves);
     }
     finish("wrench.png", wrench);
   }
 
-  Page legs("legs.png", experiment.name + ": leg lengths", program, 2, 3);
+  Page legs(series, "legs.png", experiment.name + ": leg lengths", program, 2, 3);
   for (int i = 1; i <= kLegs; ++i)
     legs.panel(
         fmt::format("leg {} [mm]", i),

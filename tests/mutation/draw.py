@@ -1,0 +1,298 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Draws deliberate errors from clang's syntax tree of the source, and writes them into it."""
+import collections
+import dataclasses
+import hashlib
+import multiprocessing
+import os
+import pathlib
+import random
+import re
+import sys
+
+import clang.cindex as ci
+from clang.cindex import CursorKind as K
+from clang.cindex import TypeKind as T
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+SOURCE = ROOT / "build" / "mutation" / "source"  # the project when the mutants were drawn
+MODULES = ["math", "kinematics", "robot", "control", "plant", "srms", "analysis", "identification"]
+RELATIONS = {"<": "<=", "<=": "<", ">": ">=", ">=": ">", "==": "!=", "!=": "=="}
+ARITHMETIC = {T.BOOL, T.INT, T.UINT, T.LONG, T.ULONG, T.LONGLONG, T.ULONGLONG, T.SHORT, T.USHORT,
+              T.CHAR_S, T.SCHAR, T.UCHAR, T.DOUBLE, T.FLOAT}
+
+
+@dataclasses.dataclass(frozen=True)
+class Mutant:
+    """One deliberate error: a source range, and what stands there instead.
+
+    In the form, @ is the mutant's number and each {} one of the source ranges in parts.
+    """
+    file: str  # below SOURCE
+    start: int
+    end: int
+    what: str
+    form: str
+    parts: tuple
+    line: int
+    line_text: str
+    text: str
+
+
+def span(cursor):
+    return cursor.extent.start.offset, cursor.extent.end.offset
+
+
+def canonical(cursor):
+    return cursor.type.get_canonical()
+
+
+def is_number(cursor):
+    return canonical(cursor).kind in ARITHMETIC
+
+
+def is_eigen(cursor):
+    return "Eigen::" in canonical(cursor).spelling
+
+
+class Finder:
+    """All mutants of one file, from clang's syntax tree of it."""
+
+    def __init__(self, path, text):
+        self.path, self.text, self.found = path, text, []
+        self.name = str(path.relative_to(SOURCE))
+        self.lines = text.splitlines()
+
+    def add(self, start, end, what, form, *parts):
+        line = self.text.count("\n", 0, start) + 1
+        self.found.append(Mutant(self.name, start, end, what, form, parts, line,
+                                 self.lines[line - 1].strip(), self.text[start:end]))
+
+    def source(self, a, b):
+        return self.text[a:b]
+
+    def walk(self, cursor, parent=None):
+        if cursor.kind in (K.ENUM_DECL, K.STATIC_ASSERT, K.TEMPLATE_TYPE_PARAMETER,
+                           K.TEMPLATE_NON_TYPE_PARAMETER, K.NAMESPACE_REF, K.TYPE_REF,
+                           K.USING_DECLARATION, K.TYPE_ALIAS_DECL, K.TYPEDEF_DECL, K.CASE_STMT):
+            if cursor.kind != K.CASE_STMT:
+                return
+            for child in list(cursor.get_children())[1:]:
+                self.visit(child, cursor)
+            return
+        if cursor.kind in (K.VAR_DECL, K.FIELD_DECL, K.FUNCTION_DECL, K.CXX_METHOD,
+                           K.CONSTRUCTOR, K.FUNCTION_TEMPLATE):
+            a, b = span(cursor)
+            head = re.split(r"[({=;]", self.source(a, b), maxsplit=1)[0]
+            if "constexpr" in head or "name" == cursor.spelling:
+                return
+        if cursor.kind == K.FIELD_DECL:  # a default value; what it is then is configuration
+            return
+        for child in cursor.get_children():
+            self.visit(child, cursor)
+
+    def visit(self, cursor, parent):
+        here = cursor.location.file
+        if here is None or os.path.realpath(here.name) != str(self.path):
+            return
+        a, b = span(cursor)
+        if 0 <= a < b <= len(self.text):
+            self.mutate(cursor, parent, a, b)
+        self.walk(cursor, parent)
+
+    def mutate(self, cursor, parent, a, b):
+        kind = cursor.kind
+        text = self.source(a, b)
+        if parent is not None and parent.kind == K.COMPOUND_STMT and "noalias" not in text:
+            call = kind in (K.CALL_EXPR, K.BINARY_OPERATOR, K.COMPOUND_ASSIGNMENT_OPERATOR,
+                            K.UNARY_OPERATOR, K.CXX_UNARY_EXPR)
+            if call and self.text[b:b + 1] == ";" and "assert" not in text:
+                self.add(a, b, "statement left out", "if (!::ves_m(@)) {}", (a, b))
+        if kind == K.IF_STMT:
+            self.condition(cursor)
+        elif kind in (K.BINARY_OPERATOR, K.COMPOUND_ASSIGNMENT_OPERATOR):
+            self.operator(cursor, a, b)
+        elif kind == K.CALL_EXPR and cursor.spelling in ("operator+", "operator-", "operator+=",
+                                                        "operator-="):
+            self.overloaded(cursor, a, b)
+        elif kind == K.UNARY_OPERATOR and text.startswith("-") and is_number(cursor):
+            inner = next(cursor.get_children(), None)
+            if inner is not None and inner.kind not in (K.INTEGER_LITERAL, K.FLOATING_LITERAL):
+                c, d = span(inner)
+                self.add(a, b, "sign dropped", "(::ves_m(@) ? ({}) : -({}))", (c, d), (c, d))
+        elif kind in (K.FLOATING_LITERAL, K.INTEGER_LITERAL):
+            self.literal(a, b, text)
+        elif kind == K.CONDITIONAL_OPERATOR:
+            parts = list(cursor.get_children())
+            if len(parts) == 3:
+                (a0, b0), (a1, b1), (a2, b2) = map(span, parts)
+                self.add(a0, b0, "choice swapped", "(::ves_m(@) != ({}))", (a0, b0))
+        elif kind == K.CALL_EXPR and cursor.spelling in ("min", "max", "sin", "cos", "abs"):
+            self.function(cursor, a, b)
+
+    def condition(self, cursor):
+        parts = [c for c in cursor.get_children()]
+        a, b = span(parts[0])
+        if parts[0].kind == K.VAR_DECL or parts[0].kind == K.DECL_STMT:
+            return
+        if canonical(parts[0]).kind != T.BOOL:
+            return
+        self.add(a, b, "condition never true", "(!::ves_m(@) && ({}))", (a, b))
+
+    def operator(self, cursor, a, b):
+        parts = list(cursor.get_children())
+        if len(parts) != 2:
+            return
+        (a0, b0), (a1, b1) = map(span, parts)
+        between = self.source(b0, a1).strip()
+        left, right = parts
+
+        sides = (a0, b0), (a1, b1), (a0, b0), (a1, b1)
+
+        def choice(other):
+            return f"(::ves_m(@) ? ({{}}) {other} ({{}}) : ({{}}) {between} ({{}}))"
+        if between in RELATIONS:
+            self.add(a, b, f"{between} to {RELATIONS[between]}", choice(RELATIONS[between]), *sides)
+        elif between in ("&&", "||"):
+            side = random.Random(a).random() < 0.5
+            other = "true" if between == "&&" else "false"
+            keep = (a0, b0) if side else (a1, b1)
+            what = f"{'right' if side else 'left'} side of {between} dropped"
+            self.add(a, b, what, f"(::ves_m(@) ? bool({{}}) : ({{}}) {between} ({{}}))", keep,
+                     *sides[2:])
+        elif between in ("+", "-") and is_number(left) and is_number(right):
+            other = "-" if between == "+" else "+"
+            self.add(a, b, f"{between} to {other}", choice(other), *sides)
+            self.add(a, b, f"term after {between} dropped",
+                     f"(::ves_m(@) ? ({{}}) + 0 * ({{}}) : ({{}}) {between} ({{}}))", *sides)
+        elif between in ("*", "/") and is_number(left) and is_number(right):
+            other = "/" if between == "*" else "*"
+            self.add(a, b, f"{between} to {other}", choice(other), *sides)
+        elif between in ("+=", "-=") and is_number(left) and is_number(right):
+            other = "-=" if between == "+=" else "+="
+            self.add(a, b, f"{between} to {other}", choice(other), *sides)
+
+    def overloaded(self, cursor, a, b):
+        arguments = list(cursor.get_arguments())
+        if len(arguments) == 1 and cursor.spelling == "operator-":
+            c, d = span(arguments[0])
+            if is_eigen(arguments[0]) and c > a:
+                self.add(a, b, "sign dropped", "(::ves_f(@, -1.0) * -({}))", (c, d))
+            return
+        if len(arguments) != 2:
+            return
+        (a0, b0), (a1, b1) = map(span, arguments)
+        symbol = cursor.spelling[len("operator"):]
+        if "noalias" in self.source(a, b):
+            return
+        if is_eigen(arguments[1]):
+            for what, factor in ((f"{symbol} reversed", "-1.0"),
+                                 (f"term after {symbol} dropped", "0.0")):
+                self.add(a1, b1, what, f"(::ves_f(@, {factor}) * ({{}}))", (a1, b1))
+        elif symbol in ("+", "-"):
+            self.add(a, b, f"term after {symbol} dropped",
+                     f"(::ves_m(@) ? ({{}}) : ({{}}) {symbol} ({{}}))",
+                     (a0, b0), (a0, b0), (a1, b1))
+
+    def literal(self, a, b, text):
+        before, after = self.text[a - 1:a], self.text[b:b + 1]
+        if before == "<" or after == ">" or self.text[a - 2:a] == "<-":
+            return
+        if re.fullmatch(r"[0-9']+\.[0-9e']*|[0-9]+e-?[0-9]+|[0-9.]+e-?[0-9]+", text):
+            zero = float(text.replace("'", "")) == 0.0
+            other = "1.0" if zero else f"1.25 * {text}"
+            self.add(a, b, f"{text} to {other}", f"(::ves_m(@) ? {other} : {text})")
+        elif re.fullmatch(r"[0-9]+", text):
+            self.add(a, b, f"{text} to {int(text) + 1}",
+                     f"(::ves_m(@) ? {int(text) + 1} : {text})")
+
+    def function(self, cursor, a, b):
+        text = self.source(a, b)
+        swap = {"min": "max", "max": "min", "sin": "cos", "cos": "sin"}
+        name = cursor.spelling
+        m = re.match(r"std::" + name + r"(<[^(]*>)?\(", text)
+        if not m or not is_number(cursor):
+            return
+        inner = a + m.end(), b - 1
+        if "{" in self.text[a:inner[0] + 1]:
+            return
+        if name == "abs":
+            self.add(a, b, "abs dropped", "(::ves_m(@) ? ({}) : std::abs({}))", inner, inner)
+        else:
+            head = m.group(0)
+            other = head.replace("::" + name, "::" + swap[name])
+            self.add(a, b, f"{name} to {swap[name]}",
+                     f"(::ves_m(@) ? {other}{{}}) : {head}{{}}))", inner, inner)
+
+
+def sources(module):
+    headers = sorted((SOURCE / "include" / "ves" / module).glob("*.hpp"))
+    return sorted((SOURCE / "src" / module).glob("*.cpp")) + headers
+
+
+def find(path):
+    """All mutants of one source file."""
+    flags = ["-xc++", "-std=c++20", f"-I{SOURCE}/include", "-I/usr/include/eigen3",
+             "-isystem", "/usr/lib/llvm-14/lib/clang/14.0.6/include"]
+    unit = ci.Index.create().parse(str(path), args=flags)
+    fatal = [d for d in unit.diagnostics if d.severity >= 3]
+    if fatal:
+        sys.exit(f"{path}: {fatal[0].spelling}")
+    finder = Finder(path, path.read_text())
+    for child in unit.cursor.get_children():
+        finder.visit(child, None)
+    return list({(m.start, m.end, m.what): m for m in finder.found}.values())
+
+
+def find_all():
+    paths = [(module, path) for module in MODULES for path in sources(module)]
+    with multiprocessing.Pool() as pool:
+        found = pool.map(find, [path for _, path in paths], chunksize=1)
+    out = {module: [] for module in MODULES}
+    for (module, _), mutants in zip(paths, found):
+        out[module] += mutants
+    return out
+
+
+def draw(found, count, seed):
+    """So many mutants in all, by the modules' shares; never two at exactly one place.
+
+    A mutant's lot depends on its own line alone: an edit elsewhere does not draw anew.
+    """
+    total = sum(len(v) for v in found.values())
+    chosen = []
+    for module, mutants in found.items():
+        met = collections.Counter()
+        lots = []
+        for m in mutants:
+            key = f"{seed} {m.file} {m.line_text} {m.text} {m.what}"
+            met[key] += 1
+            lots.append((hashlib.sha256(f"{key} {met[key]}".encode()).digest(), m))
+        wanted, taken = max(20, round(count * len(mutants) / total)), set()
+        for _, m in sorted(lots, key=lambda lot: lot[0]):
+            if wanted and (m.file, m.start, m.end) not in taken:
+                taken.add((m.file, m.start, m.end))
+                chosen.append((module, m))
+                wanted -= 1
+    return chosen
+
+
+def render(text, mutants):
+    """The text with every mutant of it, inner ones inside outer ones."""
+    def range_(lo, hi, skip):
+        inside = [m for m in mutants if lo <= m["start"] and m["end"] <= hi and m["id"] not in skip]
+        outer = [m for m in inside if not any(
+            o is not m and o["start"] <= m["start"] and m["end"] <= o["end"] for o in inside)]
+        result, at = [], lo
+        for m in sorted(outer, key=lambda x: x["start"]):
+            if m["start"] < at:
+                continue  # overlaps another without being inside it
+            result.append(text[at:m["start"]])
+            pieces = m["form"].replace("@", str(m["id"])).split("{}")
+            result.append(pieces[0])
+            for (a, b), piece in zip(m["parts"], pieces[1:]):
+                result += [range_(a, b, skip | {m["id"]}), piece]
+            at = m["end"]
+        result.append(text[at:hi])
+        return "".join(result)
+    return range_(0, len(text), frozenset())
