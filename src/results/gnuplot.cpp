@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <fstream>
 
 namespace ves {
 
@@ -14,10 +15,14 @@ std::string quoted(const std::string& text) {
 }
 
 void gnuplot(const std::string& script, const std::filesystem::path& folder) {
-  std::FILE* program = popen("gnuplot", "w");
-  if (!program) return;
-  std::fputs(fmt::format("cd {}\n{}", quoted(folder.string()), script).c_str(), program);
-  pclose(program);
+  // From a file: from a pipe gnuplot reads byte by byte.
+  const std::filesystem::path file = folder / ".gnuplot";
+  std::ofstream(file) << fmt::format("cd {}\n{}", quoted(folder.string()), script);
+  std::string quoted_file = "'";
+  for (const char c : file.string()) quoted_file += c == '\'' ? "'\\''" : std::string(1, c);
+  if (std::FILE* program = popen(("gnuplot " + quoted_file + "'").c_str(), "w")) pclose(program);
+  std::error_code none;
+  std::filesystem::remove(file, none);
 }
 
 }  // namespace ves
