@@ -3,10 +3,10 @@
 // YAML documents that remember where each value came from. yaml-cpp parses; this adds what a person
 // needs when a file is wrong: one line, `file:line: key: what is wrong, what is allowed`.
 //
-// A map may start `from: other.yaml` and then names only what differs; it then
-// stands for itself, and replaces a map of the same key in the file that `from` above it names. A
-// tag says where a number was got: !found (a cited source), !derived (computed from one),
-// !substitute (a stand-in); none: the report's own, or a choice of the experiment. A tag covers
+// A map may start `from: other.yaml` and then names only what differs; it then stands for itself, and
+// replaces a map of the same key in the file that `from` above it names. So does a map tagged
+// !replace. Other tags say where a number was got: !found (a cited source), !derived (computed from
+// one), !substitute (a stand-in); none: the report's own, or a choice of the experiment. A tag covers
 // what stands below it.
 #pragma once
 
