@@ -57,7 +57,7 @@ def enter_private_network():
 class Run:
     """One command: how it ended, what it said, what it cost."""
 
-    def __init__(self, arguments, folder, stdout=subprocess.PIPE, limits=None, sent=None):
+    def __init__(self, arguments, folder, stdout=subprocess.PIPE, limits=None, sent=None, patience=90.0):
         def prepare():
             for what, value in (limits or {}).items():
                 resource.setrlimit(what, (value, value))
@@ -66,7 +66,7 @@ class Run:
             process = subprocess.Popen([str(VES), *arguments], cwd=folder, stdin=subprocess.DEVNULL,
                                        stdout=stdout if stdout != subprocess.PIPE else subprocess.DEVNULL,
                                        stderr=err, preexec_fn=prepare, start_new_session=True)
-            killer = threading.Timer(90.0, process.kill)
+            killer = threading.Timer(patience, process.kill)
             killer.start()
             if sent:
                 sent(process)
@@ -309,6 +309,11 @@ def datagrams(rng):
                               rng.randrange(1 << 16), rng.randrange(4), rng.randrange(4)) + noise])
 
 
+def running(process):
+    """Without taking its status away from who waits for it."""
+    return os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None
+
+
 def attack_datagrams(rng, folder, count):
     """One real-time run under a flood; every datagram is an input."""
     sent = 0
@@ -316,7 +321,7 @@ def attack_datagrams(rng, folder, count):
     def flood(process):
         nonlocal sent
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
-            while sent < count and process.poll() is None:
+            while sent < count and running(process):
                 s.sendto(datagrams(rng), (GROUP, PORT))
                 sent += 1
                 if sent % 10 == 0:
@@ -324,7 +329,8 @@ def attack_datagrams(rng, folder, count):
     run = Run(["run", "z_sine", "--no-plots", "--set", "safety.stall_ticks=500", "--set",
                "safety.overruns_per_second=500", "--set",
                f"program=[{{trajectory: {{duration_s: {count / 1000 + 1:.0f}, z: {{sine: {{amplitude_m: "
-               "0.05, frequency_hz: 0.5}}}}]", "--out", "out"], folder, sent=flood)
+               "0.05, frequency_hz: 0.5}}}}]", "--out", "out"], folder, sent=flood,
+              patience=90.0 + count / 500)
     verdict = judge(run, lambda: results(folder / "out"), bound=False)
     if verdict == "survived":
         summary = json.loads((folder / "out" / "summary.json").read_text())

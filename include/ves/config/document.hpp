@@ -3,11 +3,11 @@
 // YAML documents that remember where each value came from. yaml-cpp parses; this adds what a person
 // needs when a file is wrong: one line, `file:line: key: what is wrong, what is allowed`.
 //
-// A map may start `from: other.yaml` and then names only what differs; it then stands for itself, and
-// replaces a map of the same key in the file that `from` above it names. So does a map tagged
+// A map may start `from: other.yaml` and then names only what differs; it then stands for itself,
+// and replaces a map of the same key in the file that `from` above it names. So does a map tagged
 // !replace. Other tags say where a number was got: !found (a cited source), !derived (computed from
-// one), !substitute (a stand-in); none: the report's own, or a choice of the experiment. A tag covers
-// what stands below it.
+// one), !substitute (a stand-in); none: the report's own, or a choice of the experiment. A tag
+// covers what stands below it.
 #pragma once
 
 #include <Eigen/Core>
