@@ -57,6 +57,21 @@ TEST(Gate, ItsWorstIsTheWorstOfAllPosesAndBothDirections) {
   }
 }
 
+TEST(Gate, ItsWorstDirectionIsThatOfTheFasterLegs) {  // the servo that follows best damps least
+  const auto worst = [](const std::string& extend, const std::string& retract) {
+    const Experiment e = test::experiment("doss_on_table_4_1",
+                                          {"legs.gain_extend_in_per_s_per_ma=" + extend,
+                                           "legs.gain_retract_in_per_s_per_ma=" + retract});
+    const LoopVerdict v = assessStability(e.controller, e.plant);
+    EXPECT_TRUE(v.stable);
+    const Loop& loop = v.direction == Direction::kExtending ? v.extending : v.retracting;
+    EXPECT_NEAR(v.worst.radius, radius(loop), 1e-9);
+    return v.direction;
+  };
+  EXPECT_EQ(worst("1.18", "0.77"), Direction::kExtending);
+  EXPECT_EQ(worst("0.77", "1.18"), Direction::kRetracting);
+}
+
 TEST(LoopModel, AnUndampedBaseAloneNeitherGrowsNorDecays) {  // its roots are on the unit circle
   const Experiment e = test::experiment("puma_on_table_4_1");
   Loop loop = loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kExtending);
