@@ -33,7 +33,8 @@ BUILD = WORK / "build"
 
 
 def key_of(record):
-    return f"{record['file']} | {record['line_text']} | {record['what']}"
+    text = " ".join(record["text"].split())
+    return f"{record['file']} | {record['line_text']} | {record['what']}, of {text}"
 
 
 def put(target, content, mode_of):
