@@ -41,8 +41,7 @@ inline CLI::Validator inRange(double lo, double hi) {
           fmt::format("in [{}, {}]", lo, hi)};
 }
 
-/// Ctrl-C, SIGTERM and a terminal that closes ask for a gentle end. Nobody who stops reading what
-/// we print ends a run.
+/// Ctrl-C, SIGTERM and a terminal that closes ask for a gentle end. A closed pipe ends nothing.
 inline void catchSignals() {
   struct sigaction action {};
   action.sa_handler = [](int) { stop_requested = 1; };

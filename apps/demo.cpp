@@ -13,9 +13,9 @@ int demoCommand(int argc, char** argv) {
       "ves demo");
   RunnerOptions options;
   options.scenario = "puma_on_table_4_1";
-  cli.add_option("--out", options.out, "folder for the results; a new one in ves-runs by default");
+  options.addOut(cli);
   options.addBus(cli);
-  cli.add_flag("--quiet", options.quiet, "no progress and no table; warnings and errors only");
+  options.addQuiet(cli);
   return run(cli, argc, argv, [&] { return runExperiment(options); });
 }
 

@@ -15,9 +15,9 @@ int runCommand(int argc, char** argv) {
   options.addExperiment(cli);
   options.addForce(cli);
   options.addBus(cli);
-  cli.add_option("--out", options.out, "folder for the results; a new one in ves-runs by default");
+  options.addOut(cli);
   cli.add_flag("--two-processes", options.two_processes, "in lockstep too, over the bus");
-  cli.add_flag("--quiet", options.quiet, "no progress and no table; warnings and errors only");
+  options.addQuiet(cli);
   cli.add_flag("!--no-plots", options.plots, "leave the plots out");
   return run(cli, argc, argv, [&] { return runExperiment(options); });
 }

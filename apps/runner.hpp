@@ -23,6 +23,9 @@ struct RunnerOptions : Options {
   void addOut(CLI::App& cli) {
     cli.add_option("--out", out, "folder for the results; a new one in ves-runs by default");
   }
+  void addQuiet(CLI::App& cli) {
+    cli.add_flag("--quiet", quiet, "no progress and no table; warnings and errors only");
+  }
 };
 
 inline void writeFile(const std::filesystem::path& file, const std::string& text) {

@@ -16,16 +16,21 @@
 namespace ves {
 namespace {
 
+/// After few exchanges: inside the limits, not yet good.
+PosePlan quickPlan(const Experiment& e) {
+  const StaticSetup setup = staticSetup(e.controller);
+  PosePlanOptions few;
+  few.exchanges = 50;
+  return planPoses(setup, separableCombinations(setup.robot), e.controller, e.plant.initial_joints,
+                   few);
+}
+
 TEST(PosePlan, StaysInRangesThatLieFarOff) {
   Experiment e = test::experiment("puma_on_table_4_1");
   Link& first = e.controller.payload.robot.links[0];
   first.lower = 200 * kDegree;
   first.upper = 300 * kDegree;
-  const StaticSetup setup = staticSetup(e.controller);
-  PosePlanOptions few;
-  few.exchanges = 50;
-  const PosePlan plan = planPoses(setup, separableCombinations(setup.robot), e.controller,
-                                  e.plant.initial_joints, few);
+  const PosePlan plan = quickPlan(e);
   for (const PosePlan::Attitude& a : plan.attitudes)
     for (const JointVector& q : a.q) {
       EXPECT_GE(q(0), first.lower);
@@ -38,11 +43,7 @@ TEST(PosePlan, OfALongRangeTakesWhatLiesAboutItsMiddle) {
   Link& first = e.controller.payload.robot.links[0];
   first.lower = -5.0;
   first.upper = 25.0;
-  const StaticSetup setup = staticSetup(e.controller);
-  PosePlanOptions few;
-  few.exchanges = 50;
-  const PosePlan plan = planPoses(setup, separableCombinations(setup.robot), e.controller,
-                                  e.plant.initial_joints, few);
+  const PosePlan plan = quickPlan(e);
   double low = HUGE_VAL, high = -HUGE_VAL;
   for (const PosePlan::Attitude& a : plan.attitudes)
     for (const JointVector& q : a.q) {
@@ -59,11 +60,7 @@ TEST(PosePlan, OfARangeWithoutEndTakesWhatLiesAboutZero) {
   Link& first = e.controller.payload.robot.links[0];
   first.lower = -1.0;
   first.upper = HUGE_VAL;
-  const StaticSetup setup = staticSetup(e.controller);
-  PosePlanOptions few;
-  few.exchanges = 50;
-  const PosePlan plan = planPoses(setup, separableCombinations(setup.robot), e.controller,
-                                  e.plant.initial_joints, few);
+  const PosePlan plan = quickPlan(e);
   for (const PosePlan::Attitude& a : plan.attitudes)
     for (const JointVector& q : a.q) {
       EXPECT_GE(q(0), -1.0);
@@ -73,11 +70,7 @@ TEST(PosePlan, OfARangeWithoutEndTakesWhatLiesAboutZero) {
 
 TEST(PosePlan, ItsScenarioMovesNoJointFasterThanAsked) {
   const Experiment e = test::experiment("doss_on_table_4_1");
-  const StaticSetup setup = staticSetup(e.controller);
-  PosePlanOptions few;
-  few.exchanges = 50;
-  const PosePlan plan = planPoses(setup, separableCombinations(setup.robot), e.controller,
-                                  e.plant.initial_joints, few);
+  const PosePlan plan = quickPlan(e);
   const double speed = 25.0;  // [deg/s | cm/s]
   const auto file = std::filesystem::temp_directory_path() /
                     ("ves_pose_plan_" + std::to_string(getpid()) + ".yaml");
@@ -90,7 +83,7 @@ TEST(PosePlan, ItsScenarioMovesNoJointFasterThanAsked) {
   ASSERT_GT(planned.plant.robot_events.size(), 100u);
   for (const plant::RobotEvent& event : planned.plant.robot_events) {
     const int i = event.move.joint;
-    const bool turns = setup.robot.link(i).type == JointType::kRevolute;
+    const bool turns = e.controller.payload.robot.link(i).type == JointType::kRevolute;
     fastest = std::max(fastest, std::abs(event.move.target - at(i)) / event.move.duration /
                                     (turns ? kDegree : 0.01));
     at(i) = event.move.target;

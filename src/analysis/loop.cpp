@@ -100,8 +100,8 @@ Channel channelOf(const Loop& loop) {
   MatrixXd read = MatrixXd::Identity(kSize + 1, kSize + 1);
   read.row(kFirst) = read.row(Mechanics::kLength).eval();
 
-  // The controller's tick falls anywhere between two updates: in the middle, here. An update is
-  // three readings, so the pair's first is after it.
+  // The controller's tick falls anywhere between two updates: in the middle, here. The pair's
+  // first reading comes after the tick, two thirds of the way to the next update.
   const double before = h - between;  // from an update to the first reading
   MatrixXd all = MatrixXd::Identity(kSize + 1, kSize + 1);
   const double to_tick = 0.5 * h;

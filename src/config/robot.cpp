@@ -27,8 +27,9 @@ Robot readRobot(Section s, const Value& document) {
   robot.X_RL0 = {rotation(s.vector("mount_rpy_deg", 3, -360.0, 360.0) * kDegree),
                  s.vector("mount_m", 3, -10.0, 10.0)};
   Eigen::VectorXd q(robot.urdf.model.joints);
-  if (q.size() > 0) q = s.vector("joints_deg_or_m", robot.urdf.model.joints, -1e6, 1e6);
-  if (q.size() == 0 && s.has("joints_deg_or_m") && !s.texts("joints_deg_or_m").empty())
+  if (q.size() > 0)
+    q = s.vector("joints_deg_or_m", robot.urdf.model.joints, -1e6, 1e6);
+  else if (s.has("joints_deg_or_m") && !s.texts("joints_deg_or_m").empty())
     s.fail("joints_deg_or_m", "the robot has no joint that moves, want none");
   for (int i = 0; i < robot.urdf.model.joints; ++i) {
     robot.q(i) = q(i) * jointUnit(robot.urdf.model.link(i));

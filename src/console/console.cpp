@@ -67,7 +67,7 @@ class Console {
 
   /// A line of news; an open prompt is put back below it.
   void say(const std::string& text) {
-    // Nobody who stops reading ends a run: fmt::print would throw.
+    // Not fmt::print: it throws when nobody reads, and that must not end a run.
     if (!prompt_.empty()) std::fputs("\r\033[K", stdout);
     std::fputs((text + "\n" + prompt_).c_str(), stdout);
     std::fflush(stdout);

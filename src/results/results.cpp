@@ -77,7 +77,7 @@ void Progress::show(Phase phase, int segment, std::int64_t tick, const double (&
         name(experiment_.controller.program.segments[static_cast<std::size_t>(segment)].kind),
         segment + 1, experiment_.controller.program.size);
   const double t = static_cast<double>(tick * experiment_.controller.period) * kSecondPerNanosecond;
-  // Nobody who stops reading ends a run: fmt::print would throw.
+  // Not fmt::print: it throws when nobody reads, and that must not end a run.
   const std::string line = fmt::format(
       "{}{:7.2f} s  {:<24} x {:+6.1f}  y {:+6.1f}  z {:+6.1f} mm   alpha {:+6.2f}  beta "
       "{:+6.2f}  gamma {:+6.2f} deg{}",
