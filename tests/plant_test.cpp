@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
 #include <gsl/gsl_errno.h>
 #include <gsl/gsl_odeiv2.h>
 #include <gtest/gtest.h>
 
 #include <complex>
+#include <filesystem>
 
 #include "support/poses.hpp"
 #include "support/rig.hpp"
@@ -69,8 +71,7 @@ TEST(Sensor, NoiseIsAsFigure41) {
   EXPECT_LT(largest.tail<3>().maxCoeff(), 1.0);
 }
 
-// --- The whole
-// ------------------------------------------------------------------------------------
+// --- The whole -----------------------------------------------------------------------------------
 
 TEST(Plant, RestsWhereItIs) {
   const Experiment e = experiment("puma_tilt");
@@ -91,6 +92,35 @@ TEST(Plant, FirstSampleShowsTheInitialPose) {
       legLengths(e.controller.geometry, e.controller.geometry.fromHome(e.plant.initial_pose));
   EXPECT_LE((legLengths(e.controller.legs, s.legs) - L).cwiseAbs().maxCoeff(),
             0.5 * e.plant.transducer.scale * (1 + 1e-9));
+}
+
+TEST(Plant, RestsInsideTheConvertersRangeInEveryScenario) {
+  for (const auto& file : std::filesystem::directory_iterator(test::configDir() + "/scenarios")) {
+    const Experiment e = loadExperiment(file.path());
+    EXPECT_TRUE(e.warnings.empty()) << e.name << ": " << e.warnings[0];
+    for (const int count : Plant(e.plant).sample().adc)
+      EXPECT_LT(std::abs(count), 0.9 * 32767) << e.name;
+  }
+}
+
+TEST(Plant, WarnsOfTheChannelThatTheWeightFills) {
+  int warned = 0;
+  for (const double gain : {900.0, 1000.0, 1020.0}) {
+    const Experiment e = experiment("srms_unberth_doss",
+                                    {fmt::format("sensor.gain=[500, 500, 500, {}, 500, 500]", gain),
+                                     "sensor.noise=false", "sensor.bias_v=[0, 0, 0, 0, 0, 0]"});
+    const double percent = 100.0 * std::abs(Plant(e.plant).sample().adc[3]) / 32767;
+    ASSERT_EQ(e.warnings.size(), percent > 90 ? 1u : 0u) << percent;
+    if (percent > 90) {
+      EXPECT_NE(
+          e.warnings[0].find(fmt::format("takes {:.0f} % of the range of channel mx", percent)),
+          std::string::npos)
+          << e.warnings[0] << " where the plant reads " << percent;
+      EXPECT_NE(e.warnings[0].find("sensor.gain[3]"), std::string::npos);
+      ++warned;
+    }
+  }
+  EXPECT_EQ(warned, 2);
 }
 
 TEST(Plant, IgnoresCommandsThatAreNotEngaged) {
