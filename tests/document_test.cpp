@@ -33,6 +33,13 @@ TEST(Document, IsUtf8) {
   }
 }
 
+TEST(Document, HasNoControlCharacters) {
+  EXPECT_EQ(parsed("a:\t1\r\nb: 2\n"), "");
+  for (const char bad : {'\0', '\x01', '\x08', '\x0b', '\x1b', '\x1f'})
+    EXPECT_EQ(parsed(std::string("a: 1\nb: 2") + bad + "c\n").find("a.yaml:2: byte 0x"), 0u)
+        << static_cast<int>(bad);
+}
+
 TEST(Document, IsOneDocument) {
   EXPECT_EQ(parsed("# a comment\n---\na: 1\n"), "");
   EXPECT_EQ(parsed("a: |\n  text\n  --- more\n"), "");

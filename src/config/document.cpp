@@ -33,12 +33,16 @@ std::string readFile(const std::filesystem::path& path, const std::string& asked
   return text.str();
 }
 
-/// JSON and XML that are written later would fail on anything else.
-void requireUtf8(const std::string& text, const std::string& name) {
+/// UTF-8 without control characters: JSON, XML and YAML that are written later would fail on, or
+/// lose, anything else.
+void requireText(const std::string& text, const std::string& name) {
   int line = 1;
   for (std::size_t i = 0; i < text.size();) {
     const auto byte = static_cast<unsigned char>(text[i]);
     if (byte == '\n') ++line;
+    if (byte < 0x20 && byte != '\n' && byte != '\t' && byte != '\r')
+      throw InputError(fmt::format("{}:{}: byte {:#04x} is a control character, want text", name,
+                                   line, byte));
     const std::size_t length = byte < 0x80   ? 1
                                : byte < 0xc2 ? 0
                                : byte < 0xe0 ? 2
@@ -170,7 +174,7 @@ void resolve(Value& value, const std::filesystem::path& directory, int depth) {
     const std::filesystem::path path = directory / urdf->text;
     const auto i = static_cast<std::size_t>(urdf - value.children.data());
     urdf->text = readFile(path, at);
-    requireUtf8(urdf->text, path.lexically_normal().string());
+    requireText(urdf->text, path.lexically_normal().string());
     urdf->file = std::make_shared<const std::string>(path.lexically_normal().string());
     urdf->line = 1;
     value.keys[i] = "urdf_text";
@@ -190,7 +194,7 @@ void resolve(Value& value, const std::filesystem::path& directory, int depth) {
 }
 
 Value parse(const std::string& text, const std::string& name) {
-  requireUtf8(text, name);
+  requireText(text, name);
   // Before the parser needs seconds and a gigabyte for it.
   const auto marks = std::count_if(text.begin(), text.end(), [](char c) {
     return c == '\n' || c == ',' || c == '[' || c == '{';
