@@ -3,12 +3,11 @@
 // ves stability: Appendix E as published, and the loop of this machine.
 #include <unistd.h>
 
-#include <Eigen/Eigenvalues>
-
 #include "commands.hpp"
 #include "runner.hpp"
 #include "ves/analysis/appendix_e.hpp"
 #include "ves/analysis/gate.hpp"
+#include "ves/math/dense.hpp"
 #include "ves/results/gnuplot.hpp"
 
 namespace ves::app {
@@ -185,7 +184,7 @@ int drawPublished(const std::filesystem::path& folder) {
     for (int i = 0; i <= 80; ++i) {
       const SampledOscillator o{i / 40.0, static_cast<double>(f), 0.5};
       const auto z = roots(o);
-      const Eigen::Vector3cd exact = transition(o).eigenvalues();
+      const Eigen::Vector3cd exact = eigenvalues(transition(o));
       double off = 0.0;
       for (const std::complex<double>& root : z)
         off = std::max(off, (exact.array() - root).abs().minCoeff());

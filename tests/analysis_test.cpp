@@ -2,16 +2,15 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
-#include <Eigen/QR>
 #include <filesystem>
 #include <iostream>
 #include <random>
-#include <unsupported/Eigen/MatrixFunctions>
 
 #include "support/rig.hpp"
 #include "ves/analysis/appendix_e.hpp"
 #include "ves/analysis/gate.hpp"
 #include "ves/analysis/loop.hpp"
+#include "ves/math/dense.hpp"
 #include "ves/run/run.hpp"
 #include "ves/srms/modes.hpp"
 
@@ -34,7 +33,7 @@ Eigen::Matrix3d heldExactly(const SampledOscillator& o) {
   const double r = -o.mass_ratio, z = o.damping_ratio;
   Eigen::Matrix3d A;
   A << 0, 1, 0, -1, -2 * z, 1, 0, 0, 0;
-  const Eigen::Matrix3d E = (A * 2.0 * M_PI / o.frequency_ratio).exp();
+  const Eigen::Matrix3d E = exponential(A * 2.0 * M_PI / o.frequency_ratio);
   Eigen::Matrix3d phi;
   phi.topRows<2>() = E.topRows<2>();
   phi.topRightCorner<2, 1>() *= r;
@@ -50,7 +49,7 @@ TEST(AppendixE, TransitionIsTheHeldOscillators) {  // (E.9) as it should be prin
 
 TEST(AppendixE, RootsOfThePolynomialAreTheEigenvalues) {  // (E.10), (E.11)
   for (const SampledOscillator& o : oscillators()) {
-    const Eigen::Vector3cd expected = heldExactly(o).eigenvalues();
+    const Eigen::Vector3cd expected = eigenvalues(heldExactly(o));
     for (const std::complex<double>& z : roots(o))
       EXPECT_LT((expected.array() - z).abs().minCoeff(), 1e-7) << o.mass_ratio;
   }
@@ -102,7 +101,7 @@ TEST(AppendixE, MassRatiosAreThoseOfPhysicalSpace) {  // (E.18) against (E.20)
                                   compositeBody(carried(e.plant.payload), e.plant.initial_joints));
   Mat6 M = Mat6::Zero();
   M.diagonal() << 500, 500, 500, 250, 250, 250;
-  VectorXd expected = (M.inverse() * spatialMass(robot)).eigenvalues().real();
+  VectorXd expected = eigenvalues(M.inverse() * spatialMass(robot)).real();
   std::sort(expected.begin(), expected.end(), std::greater<>());
   EXPECT_LT((massRatios(e.controller.admittance, robot) - expected).norm(), 1e-12);
 }

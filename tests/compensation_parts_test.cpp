@@ -6,10 +6,10 @@
 
 #include <Eigen/LU>
 #include <random>
-#include <unsupported/Eigen/MatrixFunctions>
 
 #include "support/poses.hpp"
 #include "support/rig.hpp"
+#include "ves/math/dense.hpp"
 #include "ves/plant/nominal_servo.hpp"
 
 namespace ves {
@@ -58,7 +58,7 @@ VectorXd exact(const ModalModel& m, const Mat6& M, const VectorXd& state, const 
   S.block(k, 2 * k, k, 1) = A_inverse * m.Phi.transpose() * F;
   VectorXd z(2 * k + 1);
   z << state, 1.0;
-  return ((S * time).exp() * z).head(2 * k);
+  return (exponential(S * time) * z).head(2 * k);
 }
 
 /// Largest error of the commanded motion over two seconds of a constant wrench.

@@ -7,7 +7,6 @@
 #include <Eigen/LU>
 #include <filesystem>
 #include <random>
-#include <unsupported/Eigen/MatrixFunctions>
 
 #include "support/poses.hpp"
 #include "support/rig.hpp"

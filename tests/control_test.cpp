@@ -5,13 +5,13 @@
 #include <kdl/chainfksolverpos_recursive.hpp>
 #include <limits>
 #include <random>
-#include <unsupported/Eigen/MatrixFunctions>
 
 #include "support/poses.hpp"
 #include "support/rig.hpp"
 #include "support/robots.hpp"
 #include "ves/config/experiment.hpp"
 #include "ves/control/gravity_compensation.hpp"
+#include "ves/math/dense.hpp"
 #include "ves/robot/newton_euler.hpp"
 #include "ves/srms/modes.hpp"
 
@@ -150,7 +150,7 @@ class HoldOracle {
     A.block<6, 6>(6, 0) = -inverse * K;
     A.block<6, 6>(6, 6) = -inverse * C;
     A.block<6, 6>(6, 12) = inverse;
-    E_ = (A * T).exp();
+    E_ = exponential(A * T);
   }
   void step(const Vec6& W) {
     Eigen::Matrix<double, 18, 1> s;

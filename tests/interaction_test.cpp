@@ -4,10 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <unsupported/Eigen/MatrixFunctions>
 
 #include "support/momentum.hpp"
 #include "support/rig.hpp"
+#include "ves/math/dense.hpp"
 #include "ves/srms/interaction.hpp"
 
 namespace ves {
@@ -132,7 +132,7 @@ TEST(Interaction, SmallMotionIsTheMatrixExponential) {
   for (const std::size_t k : {1u, 100u, 500u, 1000u}) {
     VectorXd start = VectorXd::Zero(12);
     start.head(6) = options.eta;
-    const VectorXd expected = ((S * points[k].t).exp() * start).head(6);
+    const VectorXd expected = (exponential(S * points[k].t) * start).head(6);
     EXPECT_LT((points[k].eta - expected).norm(), 1e-6 * options.eta.norm()) << points[k].t;
   }
 }

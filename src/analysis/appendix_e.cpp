@@ -3,8 +3,9 @@
 
 #include <gsl/gsl_poly.h>
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
+
+#include "ves/math/dense.hpp"
 
 namespace ves {
 
@@ -45,7 +46,7 @@ Eigen::Matrix3d transition(const SampledOscillator& o) {
 
 Eigen::VectorXd massRatios(const ModalModel& base, const RigidBody& robot_P) {
   const Eigen::MatrixXd R = base.Phi.transpose() * spatialMass(robot_P) * base.Phi;
-  return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(R).eigenvalues().reverse();
+  return symmetricEigenvalues(R).reverse();
 }
 
 }  // namespace ves

@@ -13,17 +13,23 @@ namespace {
 
 constexpr Direction kBoth[] = {Direction::kExtending, Direction::kRetracting};
 
-/// True when `change`d loops of all poses and directions decay.
+std::vector<RigidBody> programRobots(const ControllerConfig& controller,
+                                     const plant::PlantConfig& plant) {
+  std::vector<RigidBody> out;
+  for (const JointVector& q : programPoses(controller.program, plant))
+    out.push_back(lockedRobot(controller, q));
+  return out;
+}
+
+/// True when the `change`d loop decays with every robot and in both directions.
 template <class Change>
 bool holds(const ControllerConfig& controller, const plant::PlantConfig& plant,
-           const std::vector<JointVector>& poses, const Change& change) {
-  for (const JointVector& q : poses)
-    for (const Direction direction : kBoth) {
-      Loop loop = loopOf(controller, plant, q, direction);
-      change(loop);
-      if (!decays(loop)) return false;
-    }
-  return true;
+           const std::vector<RigidBody>& robots, const Change& change) {
+  return std::all_of(std::begin(kBoth), std::end(kBoth), [&](Direction direction) {
+    Loop loop = loopOf(controller, plant, plant.initial_joints, direction);
+    change(loop);
+    return decaysWithAll(loop, robots);
+  });
 }
 
 }  // namespace
@@ -60,37 +66,35 @@ std::vector<JointVector> programPoses(const Program& program, const plant::Plant
   return out;
 }
 
-LoopVerdict assessStability(const ControllerConfig& controller, const plant::PlantConfig& plant,
-                            bool cures) {
+bool isStable(const ControllerConfig& controller, const plant::PlantConfig& plant) {
+  return holds(controller, plant, programRobots(controller, plant), [](Loop&) {});
+}
+
+LoopVerdict assessStability(const ControllerConfig& controller, const plant::PlantConfig& plant) {
   LoopVerdict out;
   out.modes = static_cast<int>(controller.admittance.stiffness.size());
   out.stable_modes = out.modes;
-  const std::vector<JointVector> poses = programPoses(controller.program, plant);
+  const std::vector<RigidBody> robots = programRobots(controller, plant);
+  const auto cured = [&](const auto& change) { return holds(controller, plant, robots, change); };
+  out.stable = cured([](Loop&) {});
   double largest = 0.0;
   for (const Direction direction : kBoth) {
     double most = 0.0;
     Loop& kept = direction == Direction::kExtending ? out.extending : out.retracting;
-    for (const JointVector& q : poses) {
-      const Loop loop = loopOf(controller, plant, q, direction);
-      if (!decays(loop)) out.stable = false;
-      if (!cures) {
-        if (!out.stable) return out;
-        continue;
-      }
-      const double r = radius(loop);
+    const Loop loop = loopOf(controller, plant, plant.initial_joints, direction);
+    for (const RigidBody& robot_P : robots) {
+      const Loop with = carrying(loop, robot_P);
+      const double r = radius(with);
       if (r <= most) continue;
       most = r;
-      kept = loop;
+      kept = with;
     }
     if (most <= largest) continue;
     largest = most;
     out.direction = direction;
   }
-  if (!cures) return out;
   out.worst = dominantRoot(out.direction == Direction::kExtending ? out.extending : out.retracting);
   if (out.stable) return out;
-
-  const auto cured = [&](const auto& change) { return holds(controller, plant, poses, change); };
   out.stable_modes = 0;
   while (out.stable_modes < out.modes &&
          cured([&](Loop& l) { l.base = softest(l.base, out.stable_modes + 1); }))
@@ -125,7 +129,7 @@ std::string explain(const LoopVerdict& v) {
 
 std::string applyStabilityCheck(ControllerConfig& controller, const plant::PlantConfig& plant) {
   const auto verdict = [&](const ControllerConfig& c) {
-    return assessStability(c, plant, false).stable ? Stability::kStable : Stability::kUnstable;
+    return isStable(c, plant) ? Stability::kStable : Stability::kUnstable;
   };
   const bool forced = controller.stability == Stability::kForced;
   const Stability as_is = verdict(controller);

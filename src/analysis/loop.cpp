@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/analysis/loop.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <unsupported/Eigen/MatrixFunctions>
 #include <vector>
 
+#include "ves/math/dense.hpp"
 #include "ves/math/second_order.hpp"
 #include "ves/plant/nominal_servo.hpp"
 
@@ -83,7 +82,7 @@ Channel channelOf(const Loop& loop) {
   MatrixXd generator = MatrixXd::Zero(kSize + 1, kSize + 1);
   generator.topLeftCorner(Mechanics::kSize, Mechanics::kSize) = m.A;
   generator.block(0, kHeld, Mechanics::kSize, 1) = m.B;
-  const auto pass = [&](double dt) { return MatrixXd((generator * dt).exp()); };
+  const auto pass = [&](double dt) { return exponential(generator * dt); };
 
   // Update: the pair's second reading is now.
   MatrixXd X = MatrixXd::Zero(1, kSize + 1);
@@ -142,18 +141,33 @@ Channel observerOf(const Loop& loop) {
   next(kHeld, kSpeed) = K * (servo.reading_age - servo.derivative);
   next(kHeld, kCommand) = K;
 
-  const MatrixXd half = (generator * 0.5 * h).exp(), whole = half * half;
+  const MatrixXd half = exponential(generator * 0.5 * h), whole = half * half;
   MatrixXd all = half;
   for (int k = 0; k < updates; ++k) all = (k + 1 < updates ? whole : half) * next * all;
   return {all.topLeftCorner(kSize, kSize), all.block(0, kCommand, kSize, 1), kSensor};
 }
 
+/// What of a loop does not depend on the robot.
+struct Lifted {
+  Channel channel;
+  Channel model;          // where the inertia is taken out
+  ModalHold hold, ahead;  // over a period; to the legs' own time
+};
+
+Lifted liftedOf(const Loop& loop) {
+  const ServoModel& servo = loop.model.servo;
+  Lifted out{channelOf(loop), {}, modalHold(loop.base, loop.period), {}};
+  if (!loop.model.inertia) return out;
+  out.model = observerOf(loop);
+  out.ahead = modalHold(loop.base, wrenchDelay(servo, loop.period));
+  return out;
+}
+
 /// The whole loop over a period, of {eta, eta', six channels, six servo models where the inertia is
 /// taken out, six late wrenches a tick of delay}.
-MatrixXd systemOf(const Loop& loop) {
+MatrixXd systemOf(const Loop& loop, const Lifted& lifted) {
   const Loop::Model& own = loop.model;
-  const Channel channel = channelOf(loop);
-  const Channel model = own.inertia ? observerOf(loop) : Channel{};
+  const Channel &channel = lifted.channel, &model = lifted.model;
   const Index n = channel.step.rows(), m = model.step.rows(), k = loop.base.stiffness.size(),
               d = loop.delay;
   const MatrixXd& Phi = loop.base.Phi;
@@ -178,7 +192,7 @@ MatrixXd systemOf(const Loop& loop) {
   MatrixXd F = -spatialMass(loop.robot_P) * used;
 
   // Admittance model.
-  const ModalHold hold = modalHold(loop.base, T);
+  const ModalHold& hold = lifted.hold;
   MatrixXd before = MatrixXd::Zero(2 * k, size);
   before.leftCols(2 * k).setIdentity();
   if (own.inertia) {
@@ -194,10 +208,7 @@ MatrixXd systemOf(const Loop& loop) {
 
   // The command, from where the model is at its own time or, ahead, at the legs'.
   MatrixXd told = S.topRows(2 * k);
-  if (own.inertia) {
-    const ModalHold ahead = modalHold(loop.base, wrenchDelay(own.servo, T));
-    told = ahead.Phi * S.topRows(2 * k) + ahead.Gamma * u;
-  }
+  if (own.inertia) told = lifted.ahead.Phi * S.topRows(2 * k) + lifted.ahead.Gamma * u;
   MatrixXd command = Phi * told.topRows(k);
   if (own.feed_forward) {
     const MatrixXd x_dot = Phi * told.bottomRows(k);
@@ -223,20 +234,35 @@ MatrixXd systemOf(const Loop& loop) {
 }
 
 std::complex<double> largestRoot(const MatrixXd& S) {
-  const Eigen::VectorXcd roots = Eigen::EigenSolver<MatrixXd>(S, false).eigenvalues();
+  const Eigen::VectorXcd roots = eigenvalues(S);
   Index at = 0;
   roots.cwiseAbs().maxCoeff(&at);
   return roots(at);
 }
 
+bool decays(const Loop& loop, const Lifted& lifted) {
+  constexpr double kRounding = 1e-7;  // a free direction has a double root at one
+  constexpr double kDriftRate = 2.0 * M_PI * 0.01, kDriftGrowth = 0.02;  // [rad/s], [1/s]
+  const Eigen::VectorXcd roots = eigenvalues(systemOf(loop, lifted));
+  return std::all_of(roots.begin(), roots.end(), [&](const std::complex<double>& root) {
+    if (std::abs(root) <= 1.0 + kRounding) return true;
+    return std::abs(std::arg(root)) < kDriftRate * loop.period &&
+           std::abs(root) < 1.0 + kDriftGrowth * loop.period;
+  });
+}
+
 }  // namespace
+
+RigidBody lockedRobot(const ControllerConfig& controller, const JointVector& q) {
+  return combine(RigidBody{}, controller.payload.X_PL0(),
+                 compositeBody(carried(controller.payload), q));
+}
 
 Loop loopOf(const ControllerConfig& controller, const plant::PlantConfig& p, const JointVector& q,
             Direction direction) {
   Loop loop;
   loop.base = controller.admittance;
-  loop.robot_P = combine(RigidBody{}, controller.payload.X_PL0(),
-                         compositeBody(carried(controller.payload), q));
+  loop.robot_P = lockedRobot(controller, q);
   loop.period = static_cast<double>(controller.period) * kSecondPerNanosecond;
   const double extend = p.actuator.gain_extend, retract = p.actuator.gain_retract;
   double K = 2.0 * extend * retract / (extend + retract);
@@ -262,21 +288,24 @@ Loop loopOf(const ControllerConfig& controller, const plant::PlantConfig& p, con
   return loop;
 }
 
-bool decays(const Loop& loop) {
-  constexpr double kRounding = 1e-7;  // a free direction has a double root at one
-  constexpr double kDriftRate = 2.0 * M_PI * 0.01, kDriftGrowth = 0.02;  // [rad/s], [1/s]
-  const Eigen::VectorXcd roots = Eigen::EigenSolver<MatrixXd>(systemOf(loop), false).eigenvalues();
-  return std::all_of(roots.begin(), roots.end(), [&](const std::complex<double>& root) {
-    if (std::abs(root) <= 1.0 + kRounding) return true;
-    return std::abs(std::arg(root)) < kDriftRate * loop.period &&
-           std::abs(root) < 1.0 + kDriftGrowth * loop.period;
+Loop carrying(Loop loop, const RigidBody& robot_P) {
+  loop.robot_P = loop.model.robot_P = robot_P;
+  return loop;
+}
+
+bool decays(const Loop& loop) { return decays(loop, liftedOf(loop)); }
+
+bool decaysWithAll(const Loop& loop, const std::vector<RigidBody>& robots) {
+  const Lifted lifted = liftedOf(loop);
+  return std::all_of(robots.begin(), robots.end(), [&](const RigidBody& robot_P) {
+    return decays(carrying(loop, robot_P), lifted);
   });
 }
 
-double radius(const Loop& loop) { return std::abs(largestRoot(systemOf(loop))); }
+double radius(const Loop& loop) { return std::abs(largestRoot(systemOf(loop, liftedOf(loop)))); }
 
 DominantRoot dominantRoot(const Loop& loop) {
-  const MatrixXd S = systemOf(loop);
+  const MatrixXd S = systemOf(loop, liftedOf(loop));
   const std::complex<double> root = largestRoot(S);
   DominantRoot out;
   out.radius = std::abs(root);
@@ -299,10 +328,11 @@ DominantRoot dominantRoot(const Loop& loop) {
 
 Margins margins(const Loop& loop) {
   Margins out;
+  const Lifted lifted = liftedOf(loop);
   const auto bears = [&](double factor) {
     Loop some = loop;
     some.robot_P = heavier(factor, some.robot_P);
-    return decays(some);
+    return decays(some, lifted);
   };
   double lo = 1.0, hi = 1.0;
   while (lo < Margins::kMostGain && bears(hi = std::min(1.25 * lo, Margins::kMostGain))) lo = hi;
@@ -313,7 +343,7 @@ Margins margins(const Loop& loop) {
   out.gain = lo;
   for (Loop some = loop; out.delay < Margins::kMostDelay; ++out.delay) {
     ++some.delay;
-    if (!decays(some)) break;
+    if (!decays(some, lifted)) break;
   }
   return out;
 }

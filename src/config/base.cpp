@@ -3,11 +3,12 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <set>
+
+#include "ves/math/dense.hpp"
 
 namespace ves {
 namespace {
@@ -25,7 +26,7 @@ std::string definitenessFault(const Mat6& A, bool semidefinite) {
       if (!(std::abs(A(i, j) - A(j, i)) <= 1e-9 * scale))
         return fmt::format("not symmetric: entry [{}][{}] is {}, [{}][{}] is {}", i, j, A(i, j), j,
                            i, A(j, i));
-  const double least = Eigen::SelfAdjointEigenSolver<Mat6>(A).eigenvalues()(0);
+  const double least = symmetricEigenvalues(A)(0);
   if (semidefinite ? least >= -1e-12 * scale : least > 1e-12 * scale) return {};
   return fmt::format("smallest eigenvalue {:.4g}, want {}", least,
                      semidefinite   ? "none below 0 (positive semidefinite)"
@@ -107,7 +108,7 @@ Mat3 readInertia(Section& s, std::string_view key) {
   const Eigen::VectorXd i = s.vector(key, 6, -1e7, 1e7);
   Mat3 I;
   I << i(0), i(3), i(4), i(3), i(1), i(5), i(4), i(5), i(2);
-  const double least = Eigen::SelfAdjointEigenSolver<Mat3>(I).eigenvalues()(0);
+  const double least = symmetricEigenvalues(I)(0);
   if (!(least >= -1e-9 * I.norm()))
     s.fail(key, fmt::format("smallest principal moment {:.4g}, want none below 0", least));
   return I;

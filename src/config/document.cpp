@@ -41,8 +41,8 @@ void requireText(const std::string& text, const std::string& name) {
     const auto byte = static_cast<unsigned char>(text[i]);
     if (byte == '\n') ++line;
     if (byte < 0x20 && byte != '\n' && byte != '\t' && byte != '\r')
-      throw InputError(fmt::format("{}:{}: byte {:#04x} is a control character, want text", name,
-                                   line, byte));
+      throw InputError(
+          fmt::format("{}:{}: byte {:#04x} is a control character, want text", name, line, byte));
     const std::size_t length = byte < 0x80   ? 1
                                : byte < 0xc2 ? 0
                                : byte < 0xe0 ? 2

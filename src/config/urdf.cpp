@@ -5,11 +5,11 @@
 #include <fmt/format.h>
 #include <urdf_parser/urdf_parser.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
 #include "ves/config/document.hpp"
+#include "ves/math/dense.hpp"
 
 namespace ves {
 namespace {
@@ -159,7 +159,7 @@ class Loader {
     if (!I.allFinite() || !(I.cwiseAbs().maxCoeff() <= kMaxInertia))
       refuse("link", link.name,
              fmt::format("its inertia, want numbers within {} kg m^2", kMaxInertia));
-    const Vec3 principal = Eigen::SelfAdjointEigenSolver<Mat3>(I).eigenvalues();
+    const Vec3 principal = symmetricEigenvalues(I);
     if (principal(0) < -1e-12 * std::abs(principal(2)))
       refuse("link", link.name,
              fmt::format("principal moment of inertia {}, want at least 0", principal(0)));

@@ -2,10 +2,9 @@
 #include "ves/control/admittance_model.hpp"
 
 #include <Eigen/LU>
-#include <Eigen/QR>
 #include <cassert>
-#include <unsupported/Eigen/MatrixFunctions>
 
+#include "ves/math/dense.hpp"
 #include "ves/math/second_order.hpp"
 
 namespace ves {
@@ -31,7 +30,7 @@ ModalHold modalHold(const ModalModel& model, double dt) {
   M.block(k, 0, k, k) = -Eigen::MatrixXd(model.stiffness.asDiagonal());
   M.block(k, k, k, k) = -model.damping;
   M.block(k, 2 * k, k, k).setIdentity();
-  const Eigen::MatrixXd E = (M * dt).exp();
+  const Eigen::MatrixXd E = exponential(M * dt);
   return {E.topLeftCorner(2 * k, 2 * k), E.topRightCorner(2 * k, k)};
 }
 
@@ -110,7 +109,7 @@ ModalDynamics::Vector<kMaxModes> ModalDynamics::acceleration(const Modes& modes,
 
 AdmittanceModel::AdmittanceModel(const ModalModel& model, double period, double ahead)
     : dynamics_(model),
-      Phi_pinv_(model.Phi.completeOrthogonalDecomposition().pseudoInverse()),
+      Phi_pinv_(leastSquares(model.Phi, Mat6::Identity())),
       period_(period),
       ahead_(ahead),
       step_(dynamics_.hold(period)),

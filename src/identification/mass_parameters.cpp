@@ -5,12 +5,13 @@
 #include <gsl/gsl_linalg.h>
 
 #include <Eigen/LU>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <memory>
 #include <random>
 #include <stdexcept>
+
+#include "ves/math/dense.hpp"
 
 namespace ves {
 namespace {
@@ -139,7 +140,7 @@ SeparableCombinations separableCombinations(const RobotModel& robot) {
   }
   if (static_cast<Index>(out.leads.size()) != rank)
     throw std::domain_error("the robot's geometry leaves the rank in doubt");
-  out.C = Y(Eigen::all, out.leads).colPivHouseholderQr().solve(Y);
+  out.C = leastSquares(Y(Eigen::all, out.leads), Y);
   out.C = (out.C.array().abs() > 1e-9).select(out.C, 0.0).eval();
   for (Index i = 0; i < rank; ++i) out.names.push_back(nameOf(out.C.row(i).transpose()));
   return out;

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/identification/pose_plan.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <random>
 #include <stdexcept>
+
+#include "ves/math/dense.hpp"
 
 namespace ves {
 namespace {
@@ -160,9 +161,7 @@ class Planner {
   }
   double condition(const MatrixXd& information) const {
     const VectorXd values =
-        Eigen::SelfAdjointEigenSolver<MatrixXd>(
-            scale_.asDiagonal() * information * scale_.asDiagonal(), Eigen::EigenvaluesOnly)
-            .eigenvalues();
+        symmetricEigenvalues(scale_.asDiagonal() * information * scale_.asDiagonal());
     return values(0) > 0.0 ? std::sqrt(values(values.size() - 1) / values(0)) : HUGE_VAL;
   }
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/results/comparison.hpp"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
+#include "ves/math/dense.hpp"
 #include "ves/srms/modes.hpp"
 
 namespace ves {
@@ -71,7 +71,7 @@ std::optional<Emulation> emulation(const Series& series) {
   options.step = e.controller.period;
   const Interaction interaction = interactionOf(e, options.duration);
   const Vec6 start = commanded(series).x.front();
-  options.eta = interaction.base.Phi.completeOrthogonalDecomposition().solve(start);
+  options.eta = leastSquares(interaction.base.Phi, start);
   options.eta_dot = Eigen::VectorXd::Zero(options.eta.size());
   const Vec6 rest = start - interaction.base.Phi * options.eta;
   for (Vec6& x : out.platform.x) x -= rest;
@@ -122,7 +122,7 @@ std::vector<CoupledMode> coupledModes(const Interaction& interaction) {
   const Eigenmodes modes = eigenmodes(A, base.stiffness.asDiagonal());
   // xi = V^T A eta, eta = Phi^+ x
   const Eigen::MatrixXd to_modes =
-      modes.shapes.transpose() * A * base.Phi.completeOrthogonalDecomposition().pseudoInverse();
+      modes.shapes.transpose() * A * leastSquares(base.Phi, Mat6::Identity());
   std::vector<CoupledMode> out;
   for (Eigen::Index j = 0; j < modes.stiffness.size(); ++j) {
     const Eigen::VectorXd v = modes.shapes.col(j);

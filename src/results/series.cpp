@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/results/series.hpp"
 
+#include <fmt/compile.h>
 #include <fmt/format.h>
 #include <fmt/os.h>
 
@@ -202,8 +203,10 @@ std::string csvHeader(const std::vector<Column>& columns) {
 
 std::string csvRow(const std::vector<Column>& columns, const Row& row) {
   std::string line;
-  for (const Column& column : columns)
-    fmt::format_to(std::back_inserter(line), "{}{}", line.empty() ? "" : ",", column.value(row));
+  for (const Column& column : columns) {
+    if (!line.empty()) line += ',';
+    fmt::format_to(std::back_inserter(line), FMT_COMPILE("{}"), column.value(row));
+  }
   return line;
 }
 

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/srms/arm.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+
+#include "ves/math/dense.hpp"
 
 namespace ves {
 namespace {
@@ -56,7 +57,7 @@ Eigen::MatrixXd tipDisplacement(const ArmModel& arm) {
 
 Mat6 tipCompliance(const ArmModel& arm) {
   const Eigen::MatrixXd D = tipDisplacement(arm);
-  return D * arm.frame.K().ldlt().solve(D.transpose());
+  return D * solvePositive(arm.frame.K(), D.transpose());
 }
 
 Vec6 masslessFrequencies(const ArmModel& arm, const RigidBody& payload_P) {

@@ -4,11 +4,11 @@
 #include <gsl/gsl_errno.h>
 #include <gsl/gsl_odeiv2.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <memory>
 #include <stdexcept>
 
+#include "ves/math/dense.hpp"
 #include "ves/robot/newton_euler.hpp"
 
 namespace ves {
@@ -65,7 +65,7 @@ class Equations {
       split(q, eta_dot, A, right);
     else
       whole(q, y, A, right);
-    dy.segment(k, k) = A.llt().solve(right);
+    dy.segment(k, k) = solvePositive(A, right);
     const Vec3 w = base_.Phi.bottomRows<3>() * eta_dot;
     const Eigen::Quaterniond R_IP(Eigen::Vector4d(y.tail<4>()));
     dy.tail<4>() = 0.5 * (Eigen::Quaterniond(0.0, w.x(), w.y(), w.z()) * R_IP).coeffs();

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "reproduction.hpp"
 
-#include <Eigen/QR>
 #include <cmath>
 
+#include "ves/math/dense.hpp"
 #include "ves/simulation/one_leg.hpp"
 
 namespace ves {
@@ -19,8 +19,7 @@ void updateRate(Reproduction& r) {
         r.run("free_decay", {fmt::format("controller.period_ns={}", period)});
     const Motion m = commanded(run.series);
     const ModalModel& base = run.series.experiment.controller.admittance;
-    const Eigen::VectorXd eta0 =
-        base.Phi.completeOrthogonalDecomposition().pseudoInverse() * m.x.front();
+    const Eigen::VectorXd eta0 = leastSquares(base.Phi, m.x.front());
     for (std::size_t n = 0; n < m.t.size(); ++n) {
       Eigen::VectorXd eta = eta0;
       for (Eigen::Index i = 0; i < eta.size(); ++i) {  // let go at rest, underdamped

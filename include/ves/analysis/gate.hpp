@@ -28,9 +28,9 @@ struct LoopVerdict {
 /// monitor looks at those.
 std::vector<JointVector> programPoses(const Program& program, const plant::PlantConfig& plant);
 
-/// Without `cures`: only whether it is stable.
-LoopVerdict assessStability(const ControllerConfig& controller, const plant::PlantConfig& plant,
-                            bool cures = true);
+/// Whether the loop decays at its worst. Much less work than the rest of the verdict.
+bool isStable(const ControllerConfig& controller, const plant::PlantConfig& plant);
+LoopVerdict assessStability(const ControllerConfig& controller, const plant::PlantConfig& plant);
 
 /// In one line: what grows, how fast, and what would cure it.
 std::string explain(const LoopVerdict& verdict);

@@ -19,7 +19,7 @@
 // out: quantisation, limits, and gravity on a tilting robot, which the controller compensates.
 #pragma once
 
-#include <string>
+#include <vector>
 
 #include "ves/control/test_platform.hpp"
 #include "ves/plant/plant.hpp"
@@ -54,9 +54,15 @@ struct Loop {
 /// long as its speed is nearly a sine.
 enum class Direction { kExtending, kRetracting, kSwinging };
 
+/// The robot as the controller believes it, its joints locked at q.
+RigidBody lockedRobot(const ControllerConfig& controller, const JointVector& q);
+
 /// The loop of an experiment, the robot as the controller believes it, its joints at q.
 Loop loopOf(const ControllerConfig& controller, const plant::PlantConfig& plant,
             const JointVector& q, Direction direction);
+
+/// The same with another robot, which the controller knows too.
+Loop carrying(Loop loop, const RigidBody& robot_P);
 
 /// The root of largest magnitude.
 struct DominantRoot {
@@ -73,6 +79,9 @@ double radius(const Loop& loop);
 /// No root outside the unit circle. A base that is free in a direction drifts, and a robot on it
 /// may turn drift (below 0.01 Hz) into a growth that takes minutes: that is let pass, up to 0.02/s.
 bool decays(const Loop& loop);
+
+/// The same, carrying each of these robots in turn; most of the work is done once for all of them.
+bool decaysWithAll(const Loop& loop, const std::vector<RigidBody>& robots);
 
 /// Factor on the robot's inertia that the loop bears, the controller's belief unchanged, and ticks
 /// of further delay; from a stable loop.

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Dense linear algebra for everything that is not a tick: Eigen's decompositions, compiled once.
+#pragma once
+
+#include <Eigen/Core>
+
+namespace ves {
+
+/// Of a square matrix, in no order.
+Eigen::VectorXcd eigenvalues(const Eigen::MatrixXd& A);
+
+/// Of a symmetric matrix, the smallest first. Reads the lower triangle.
+Eigen::VectorXd symmetricEigenvalues(const Eigen::MatrixXd& A);
+
+/// e^A of a square matrix.
+Eigen::MatrixXd exponential(const Eigen::MatrixXd& A);
+
+/// X of least norm among those with the least |A X - B|, whatever the rank of A (m x n, m x k).
+Eigen::MatrixXd leastSquares(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B);
+
+/// X of A X = B, A symmetric and positive definite.
+Eigen::MatrixXd solvePositive(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B);
+
+}  // namespace ves
