@@ -45,6 +45,18 @@ class ClosedLoop : public testing::Test {
   RunResult result_;
 };
 
+TEST_F(ClosedLoop, RowsInMemoryAreTheRowsOfTheLog) {
+  const Experiment e = experiment("srms_capture_puma");
+  const Series logged = run(e);
+  const RecordedRun kept = recordLockstep(e);
+  EXPECT_EQ(kept.result.ticks, result_.ticks);
+  EXPECT_EQ(kept.series.version, logged.version);
+  ASSERT_EQ(kept.series.rows.size(), logged.rows.size());
+  const std::vector<Column> all = columns(e);
+  for (std::size_t i = 0; i < logged.rows.size(); ++i)
+    ASSERT_EQ(csvRow(all, kept.series.rows[i]), csvRow(all, logged.rows[i])) << i;
+}
+
 bool in(const Row& row, int segment) {
   return row.state.phase == static_cast<int>(Phase::kRunning) && row.state.segment == segment;
 }

@@ -45,17 +45,11 @@ Experiment assessed(const std::string& name, std::vector<std::string> set,
 
 class Emulation : public testing::Test {
  protected:
-  void TearDown() override { std::filesystem::remove(log_); }
-
   Series run(const Experiment& e) {
-    {
-      LogWriter writer(log_.string());
-      result_ = runLockstep(e, &writer, nullptr);
-    }
-    return readSeries(log_.string());
+    RecordedRun recorded = recordLockstep(e);
+    result_ = recorded.result;
+    return std::move(recorded.series);
   }
-  std::filesystem::path log_ =
-      std::filesystem::temp_directory_path() / ("ves_compensation_" + std::to_string(getpid()));
   RunResult result_;
 };
 

@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <gsl/gsl_eigen.h>
+#include <gsl/gsl_linalg.h>
 #include <gtest/gtest.h>
 
 #include <kdl/frames.hpp>
 #include <ostream>
+#include <random>
 #include <unsupported/Eigen/MatrixFunctions>
 
 #include "support/poses.hpp"
 #include "ves/math/butterworth.hpp"
+#include "ves/math/dense.hpp"
 #include "ves/math/frames.hpp"
 #include "ves/math/quintic.hpp"
 #include "ves/math/second_order.hpp"
@@ -210,6 +214,97 @@ TEST(Quintic, RatesAreDerivatives) {
                 1e-8);
   }
 }
+
+// --- Dense linear algebra, beside GSL's ----------------------------------------------------------
+
+class Dense : public testing::TestWithParam<int> {
+ protected:
+  static Eigen::MatrixXd draw(Eigen::Index rows, Eigen::Index cols) {
+    std::mt19937 random(7);
+    std::uniform_real_distribution<double> one(-1.0, 1.0);
+    return Eigen::MatrixXd::NullaryExpr(rows, cols, [&] { return one(random); });
+  }
+  static gsl_matrix* copy(const Eigen::MatrixXd& A) {
+    gsl_matrix* out =
+        gsl_matrix_alloc(static_cast<std::size_t>(A.rows()), static_cast<std::size_t>(A.cols()));
+    for (Eigen::Index i = 0; i < A.rows(); ++i)
+      for (Eigen::Index j = 0; j < A.cols(); ++j)
+        gsl_matrix_set(out, static_cast<std::size_t>(i), static_cast<std::size_t>(j), A(i, j));
+    return out;
+  }
+  const Eigen::Index n = GetParam();
+};
+
+TEST_P(Dense, EigenvaluesAndTheirVectors) {
+  const Eigen::MatrixXd A = draw(n, n);
+  gsl_matrix* a = copy(A);
+  const auto size = static_cast<std::size_t>(n);
+  gsl_vector_complex* values = gsl_vector_complex_alloc(size);
+  gsl_eigen_nonsymm_workspace* work = gsl_eigen_nonsymm_alloc(size);
+  gsl_eigen_nonsymm(a, values, work);
+  const Eigen::VectorXcd found = eigenvalues(A);
+  for (std::size_t i = 0; i < size; ++i) {
+    const gsl_complex z = gsl_vector_complex_get(values, i);
+    const std::complex<double> expected(GSL_REAL(z), GSL_IMAG(z));
+    EXPECT_LT((found.array() - expected).abs().minCoeff(), 1e-12);
+    const Eigen::VectorXcd v = eigenvector(A, expected);
+    EXPECT_NEAR(v.norm(), 1.0, 1e-12);
+    EXPECT_LT((A * v - expected * v).norm(), 1e-8);
+  }
+  gsl_eigen_nonsymm_free(work);
+  gsl_vector_complex_free(values);
+  gsl_matrix_free(a);
+}
+
+TEST_P(Dense, SymmetricEigenvaluesTheSmallestFirst) {
+  const Eigen::MatrixXd half = draw(n, n), A = half + half.transpose();
+  gsl_matrix* a = copy(A);
+  gsl_vector* values = gsl_vector_alloc(static_cast<std::size_t>(n));
+  gsl_eigen_symm_workspace* work = gsl_eigen_symm_alloc(static_cast<std::size_t>(n));
+  gsl_eigen_symm(a, values, work);
+  std::vector<double> expected(values->data, values->data + n);
+  std::sort(expected.begin(), expected.end());
+  const Eigen::VectorXd found = symmetricEigenvalues(A);
+  for (Eigen::Index i = 0; i < n; ++i)
+    EXPECT_NEAR(found(i), expected[static_cast<std::size_t>(i)], 1e-12);
+  gsl_eigen_symm_free(work);
+  gsl_vector_free(values);
+  gsl_matrix_free(a);
+}
+
+TEST_P(Dense, Exponential) {
+  const Eigen::MatrixXd A = draw(n, n);
+  gsl_matrix *a = copy(A), *e = copy(A);
+  gsl_linalg_exponential_ss(a, e, GSL_PREC_DOUBLE);
+  const Eigen::MatrixXd found = exponential(A);
+  for (Eigen::Index i = 0; i < n; ++i)
+    for (Eigen::Index j = 0; j < n; ++j)
+      EXPECT_NEAR(found(i, j),
+                  gsl_matrix_get(e, static_cast<std::size_t>(i), static_cast<std::size_t>(j)),
+                  1e-11 * found.norm());
+  gsl_matrix_free(e);
+  gsl_matrix_free(a);
+}
+
+TEST_P(Dense, LeastSquaresOfAnyRank) {
+  // B's part in the column space is met, and X lies in the row space: Penrose's conditions.
+  for (const Eigen::Index rank : {Eigen::Index{1}, n - 1, n}) {
+    const Eigen::MatrixXd A = draw(2 * n, rank) * draw(rank, n), B = draw(2 * n, 3);
+    const Eigen::MatrixXd X = leastSquares(A, B);
+    EXPECT_LT((A.transpose() * (A * X - B)).norm(), 1e-11) << rank;
+    const Eigen::MatrixXd P = leastSquares(A, Eigen::MatrixXd::Identity(2 * n, 2 * n));
+    EXPECT_LT((P * A * X - X).norm(), 1e-10 * X.norm()) << rank;
+    EXPECT_LT((P * A - (P * A).transpose()).norm(), 1e-10) << rank;
+  }
+}
+
+TEST_P(Dense, SolvePositive) {
+  const Eigen::MatrixXd half = draw(n, n), B = draw(n, 2);
+  const Eigen::MatrixXd A = half * half.transpose() + Eigen::MatrixXd::Identity(n, n);
+  EXPECT_LT((A * solvePositive(A, B) - B).norm(), 1e-11);
+}
+
+INSTANTIATE_TEST_SUITE_P(Sizes, Dense, testing::Values(2, 6, 40));
 
 }  // namespace
 }  // namespace ves

@@ -58,16 +58,34 @@ TEST(RingDown, FitsADecayThatIsKnown) {
   }
 }
 
-/// A run, by way of a log.
-Series seriesOf(const Experiment& e) {
-  const fs::path log = fs::temp_directory_path() / ("ves_report_" + std::to_string(getpid()));
-  {
-    LogWriter writer(log.string());
-    runLockstep(e, &writer, {});
+TEST(ReferenceMotions, AreSharedByRunsThatDifferInWhatTheBaseDoesNotFeel) {
+  ReferenceMotions references;
+  const auto base = [&](const std::vector<std::string>& set) {
+    std::vector<std::string> all = {
+        "program=[{move: {}}, {calibration: {}}, {admittance: "
+        "{duration_s: 1}, robot: [{at_s: 0, duration_s: 1, joint: "
+        "joint_1, to_deg_or_m: 10}]}]"};
+    all.insert(all.end(), set.begin(), set.end());
+    const Series series = recordLockstep(test::experiment("srms_capture_puma", all)).series;
+    const auto shared = emulation(series, references), fresh = emulation(series);
+    EXPECT_EQ(shared->base.x, fresh->base.x);
+    return shared->base.x.back();
+  };
+  const Vec6 first = base({});
+  for (const char* same : {"seed=5", "gravity_m_per_s2=0", "legs.filters=outputs",
+                           "sensor.noise=false", "controller.compensation.feed_forward=true"})
+    EXPECT_EQ(base({same}), first) << same;
+  EXPECT_EQ(references.computed(), 1);
+  int computed = 1;
+  for (const char* other :
+       {"base.keep_modes=1", "robot.adapter.mass_kg=40", "program.2.admittance.duration_s=1.1",
+        "controller.period_ns=5000000", "program.2.robot.0.to_deg_or_m=11",
+        "robot.joints_deg_or_m=[0, 0, 90, 0, 0, 10]"}) {
+    base({other});
+    EXPECT_EQ(references.computed(), ++computed) << other;
   }
-  Series series = readSeries(log.string());
-  fs::remove(log);
-  return series;
+  base({});  // longer ago than is kept
+  EXPECT_EQ(references.computed(), ++computed);
 }
 
 TEST(VesOnTheArm, RingsDownAsTheModelOfItsLoopSays) {
@@ -86,7 +104,7 @@ TEST(VesOnTheArm, RingsDownAsTheModelOfItsLoopSays) {
         ", beta_deg: " + std::to_string(offset(4) / kDegree) +
         "}}}, {admittance: {duration_s: 15}}]");
     const Experiment e = test::experiment("srms_unberth_doss", with);
-    const RingDown fit = ringDown(commanded(seriesOf(e)), softest_mode);
+    const RingDown fit = ringDown(commanded(recordLockstep(e).series), softest_mode);
     const double decay = fit.damping_ratio * 2 * M_PI * fit.frequency;
     const JointVector& q = e.plant.initial_joints;
     const double slow =

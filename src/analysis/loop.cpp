@@ -311,15 +311,8 @@ DominantRoot dominantRoot(const Loop& loop) {
   out.radius = std::abs(root);
   out.growth = std::log(out.radius) / loop.period;
   out.frequency = std::abs(std::arg(root)) / (2.0 * M_PI * loop.period);
-  // Inverse iteration: one step from a root that is known to rounding.
-  const Eigen::MatrixXcd shifted =
-      S.cast<std::complex<double>>() -
-      root * (1.0 + 1e-10) * Eigen::MatrixXcd::Identity(S.rows(), S.cols());
-  Eigen::VectorXcd vector = Eigen::VectorXcd::Ones(S.rows());
-  const Eigen::PartialPivLU<Eigen::MatrixXcd> lu(shifted);
-  for (int i = 0; i < 3; ++i) vector = lu.solve(vector).normalized();
-  Eigen::Matrix<std::complex<double>, 6, 1> x =
-      loop.base.Phi * vector.head(loop.base.stiffness.size());
+  const Eigen::Matrix<std::complex<double>, 6, 1> x =
+      loop.base.Phi * eigenvector(S, root).head(loop.base.stiffness.size());
   Index largest = 0;
   x.cwiseAbs().maxCoeff(&largest);
   out.shape = (x / x(largest)).real();

@@ -8,12 +8,12 @@
 #include <numeric>
 #include <set>
 
+#include "readers.hpp"
 #include "ves/math/dense.hpp"
 
 namespace ves {
 namespace {
 
-constexpr double kAny = HUGE_VAL;
 constexpr double kMostShape = 1e3;  // [1/sqrt(kg)], [1/sqrt(kg) rad/m]: a mass of a milligram
 constexpr int kMostDofs = 600;      // [-] of an arm
 

@@ -176,18 +176,23 @@ Experiment loadExperiment(const std::filesystem::path& file,
   if (!calibration.empty()) document.put("calibration", loadDocument(calibration));
   if (!masses.empty()) document.put("masses", loadDocument(masses));
   if (!servo.empty()) document.put("servo", loadDocument(servo));
+  return buildExperiment(std::move(document), overrides);
+}
+
+Experiment buildExperiment(Value document, const std::vector<std::string>& overrides) {
   for (const std::string& assignment : overrides) applyOverride(document, assignment);
-  return build(document);
+  Experiment out = build(document);
+  out.document = std::move(document);
+  return out;
 }
 
 Experiment parseExperiment(const std::string& resolved, const std::string& name) {
-  return build(parseDocument(resolved, name));
+  return buildExperiment(parseDocument(resolved, name));
 }
 
 std::string applyStabilityCheck(Experiment& e) {
   const std::string why = applyStabilityCheck(e.controller, e.plant);
-  Value document = parseDocument(e.resolved, e.name);
-  Value& controller = *document.find("controller");
+  Value& controller = *e.document.find("controller");
   const auto put = [&](const char* key, Stability verdict) {
     Value value;
     value.kind = Value::Kind::kScalar;
@@ -196,7 +201,7 @@ std::string applyStabilityCheck(Experiment& e) {
   };
   put("stability", e.controller.stability);
   put("stability_uncompensated", e.controller.stability_uncompensated);
-  e.resolved = emit(document);
+  e.resolved = emit(e.document);
   e.hash = fingerprint(e.resolved);
   return why;
 }

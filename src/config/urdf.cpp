@@ -32,7 +32,7 @@ Transform toTransform(const urdf::Pose& pose) {
 }
 
 constexpr std::size_t kMaxElement = 8192;  // [B]
-constexpr int kMaxDepth = 64;              // [-] of elements
+constexpr int kMaxElementDepth = 64;       // [-]
 constexpr double kMaxLength = 1e3;         // [m]
 constexpr double kMaxMass = 1e6;           // [kg]
 constexpr double kMaxInertia = 1e9;        // [kg m^2]
@@ -82,9 +82,9 @@ class Loader {
       const char first = at + 1 < text_.size() ? text_[at + 1] : '>';
       if (first == '/')
         --depth;
-      else if (first != '?' && first != '!' && text_[end - 1] != '/' && ++depth > kMaxDepth)
+      else if (first != '?' && first != '!' && text_[end - 1] != '/' && ++depth > kMaxElementDepth)
         throw InputError(
-            fmt::format("{}:{}: elements nested deeper than {}", file_, lineAt(at), kMaxDepth));
+            fmt::format("{}:{}: elements nested deeper than {}", file_, lineAt(at), kMaxElementDepth));
       at = end;
     }
   }

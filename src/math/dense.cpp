@@ -3,6 +3,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <Eigen/QR>
 #include <unsupported/Eigen/MatrixFunctions>
 
@@ -12,6 +13,16 @@ using Eigen::MatrixXd;
 
 Eigen::VectorXcd eigenvalues(const MatrixXd& A) {
   return Eigen::EigenSolver<MatrixXd>(A, false).eigenvalues();
+}
+
+Eigen::VectorXcd eigenvector(const MatrixXd& A, std::complex<double> eigenvalue) {
+  const Eigen::MatrixXcd shifted =
+      A.cast<std::complex<double>>() -
+      eigenvalue * (1.0 + 1e-10) * Eigen::MatrixXcd::Identity(A.rows(), A.cols());
+  const Eigen::PartialPivLU<Eigen::MatrixXcd> lu(shifted);
+  Eigen::VectorXcd vector = Eigen::VectorXcd::Ones(A.rows());
+  for (int i = 0; i < 3; ++i) vector = lu.solve(vector).normalized();
+  return vector;
 }
 
 Eigen::VectorXd symmetricEigenvalues(const MatrixXd& A) {

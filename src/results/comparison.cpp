@@ -57,7 +57,35 @@ Motion actual(const Series& series) {
   return out;
 }
 
+const std::optional<Motion>& ReferenceMotions::of(const Interaction& interaction, std::int64_t step,
+                                                  std::int64_t duration,
+                                                  const Eigen::VectorXd& eta) {
+  const auto at = std::find_if(known_.begin(), known_.end(), [&](const Known& k) {
+    return k.interaction == interaction && k.step == step && k.duration == duration && k.eta == eta;
+  });
+  if (at != known_.end()) return at->motion;
+  if (known_.size() == kKept) known_.pop_front();
+  Known& fresh = known_.emplace_back(Known{interaction, step, duration, eta, {}});
+  ++computed_;
+  InteractionOptions options;
+  options.model = InteractionModel::kWhole;
+  options.step = step;
+  options.duration = duration;
+  options.eta = eta;
+  options.eta_dot = Eigen::VectorXd::Zero(eta.size());
+  try {
+    fresh.motion = motion(simulate(interaction, options));
+  } catch (const std::domain_error&) {
+  }
+  return fresh.motion;
+}
+
 std::optional<Emulation> emulation(const Series& series) {
+  ReferenceMotions references;
+  return emulation(series, references);
+}
+
+std::optional<Emulation> emulation(const Series& series, ReferenceMotions& references) {
   constexpr Eigen::Index kMostModes = 12;
   const Experiment& e = series.experiment;
   if (!wantsAdmittance(e.controller.program) ||
@@ -66,20 +94,16 @@ std::optional<Emulation> emulation(const Series& series) {
   Emulation out;
   out.platform = actual(series);
   if (out.platform.x.size() < 2) return {};
-  InteractionOptions options;
-  options.model = InteractionModel::kWhole;
-  options.step = e.controller.period;
-  const Interaction interaction = interactionOf(e, options.duration);
+  std::int64_t duration = 0;
+  const Interaction interaction = interactionOf(e, duration);
   const Vec6 start = commanded(series).x.front();
-  options.eta = leastSquares(interaction.base.Phi, start);
-  options.eta_dot = Eigen::VectorXd::Zero(options.eta.size());
-  const Vec6 rest = start - interaction.base.Phi * options.eta;
+  const Eigen::VectorXd eta = leastSquares(interaction.base.Phi, start);
+  const Vec6 rest = start - interaction.base.Phi * eta;
   for (Vec6& x : out.platform.x) x -= rest;
-  try {
-    out.base = motion(simulate(interaction, options));
-  } catch (const std::domain_error&) {
-    return {};
-  }
+  const std::optional<Motion>& base =
+      references.of(interaction, e.controller.period, duration, eta);
+  if (!base) return {};
+  out.base = *base;
   return out;
 }
 

@@ -17,30 +17,31 @@
 
 namespace ves {
 std::optional<Row> RowMaker::add(const LogEvent& event, const std::string& log) {
+  if (event.channel == channel::kState) return add(event.require<state_t>(log));
   if (event.channel == channel::kTruth) {
-    const auto truth = event.require<truth_t>(log);
-    truths_.put(truth.header.sequence, truth);
+    add(event.require<truth_t>(log));
   } else if (event.channel == channel::kSample) {
-    const auto sample = event.require<sample_t>(log);
-    samples_.put(sample.header.sequence, sample);
+    add(event.require<sample_t>(log));
   } else if (event.channel == channel::kTiming && row_) {
     row_->timing = event.require<timing_t>(log);
     row_->has_timing = true;
-  } else if (event.channel == channel::kState) {
-    Row row;
-    row.state = event.require<state_t>(log);
-    if (!start_) start_ = row.state.header.time_ns;
-    row.t = static_cast<double>(row.state.header.time_ns - *start_) * kSecondPerNanosecond;
-    const auto take = [&](const auto& from, auto& to, bool& has) {
-      const auto* message = from.find(row.state.sample_sequence);
-      has = message != nullptr;
-      if (message) to = *message;
-    };
-    take(truths_, row.truth, row.has_truth);
-    take(samples_, row.sample, row.has_sample);
-    return std::exchange(row_, row);
   }
   return {};
+}
+
+std::optional<Row> RowMaker::add(const state_t& state) {
+  Row row;
+  row.state = state;
+  if (!start_) start_ = state.header.time_ns;
+  row.t = static_cast<double>(state.header.time_ns - *start_) * kSecondPerNanosecond;
+  const auto take = [&](const auto& from, auto& to, bool& has) {
+    const auto* message = from.find(state.sample_sequence);
+    has = message != nullptr;
+    if (message) to = *message;
+  };
+  take(truths_, row.truth, row.has_truth);
+  take(samples_, row.sample, row.has_sample);
+  return std::exchange(row_, row);
 }
 
 Series readSeries(const std::string& log) {
@@ -90,6 +91,38 @@ Series readSeries(const std::string& log) {
     throw InputError(
         fmt::format("{}: no configuration in this log (channel {})", log, channel::kExperiment));
   return series;
+}
+
+namespace {
+
+class SeriesRecorder : public RunRecorder {
+ public:
+  explicit SeriesRecorder(Series& series) : series_(series) {}
+  void begin(const experiment_t& experiment) override { series_.version = experiment.version; }
+  void tick(const TickMessages& m, std::int64_t) override {
+    rows_.add(m.truth);
+    rows_.add(m.sample);
+    if (const auto row = rows_.add(m.state)) series_.rows.push_back(*row);
+  }
+  void order(const operator_t&, std::int64_t) override {}
+  void end() {
+    if (const auto row = rows_.finish()) series_.rows.push_back(*row);
+  }
+
+ private:
+  Series& series_;
+  RowMaker rows_;
+};
+
+}  // namespace
+
+RecordedRun recordLockstep(const Experiment& experiment) {
+  RecordedRun out;
+  out.series.experiment = experiment;
+  SeriesRecorder recorder(out.series);
+  out.result = runRecorded(experiment, &recorder, {});
+  recorder.end();
+  return out;
 }
 
 namespace {

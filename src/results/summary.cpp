@@ -11,7 +11,6 @@
 #include "evidence.hpp"
 #include "ves/base/coordinates.hpp"
 #include "ves/realtime/latency.hpp"
-#include "ves/results/comparison.hpp"
 #include "ves/results/drift_samples.hpp"
 
 namespace ves {
@@ -151,8 +150,8 @@ void addDrift(const Series& series, nlohmann::ordered_json& out) {
 }
 
 /// How far the platform was from the robot on its base in free space.
-void addEmulation(const Series& series, nlohmann::ordered_json& out) {
-  const std::optional<Emulation> e = emulation(series);
+void addEmulation(const Series& series, ReferenceMotions& references, nlohmann::ordered_json& out) {
+  const std::optional<Emulation> e = emulation(series, references);
   if (!e) return;
   const Distance error = distance(e->platform, e->base), moved = travel(e->base);
   out["emulation_travel_m"] = moved.peak_position;
@@ -203,6 +202,12 @@ void addTiming(const Series& series, nlohmann::ordered_json& out) {
 }  // namespace
 
 nlohmann::ordered_json summarise(const Series& series, const RunResult& result) {
+  ReferenceMotions references;
+  return summarise(series, result, references);
+}
+
+nlohmann::ordered_json summarise(const Series& series, const RunResult& result,
+                                 ReferenceMotions& references) {
   nlohmann::ordered_json out;
   out["scenario"] = series.experiment.name;
   out["description"] = series.experiment.description;
@@ -231,7 +236,7 @@ nlohmann::ordered_json summarise(const Series& series, const RunResult& result) 
   out["log_trouble"] = result.log_trouble;
   out["real_time_factor"] = result.wall > 0.0 ? result.simulated / result.wall : 0.0;
   addTracking(series, out);
-  addEmulation(series, out);
+  addEmulation(series, references, out);
   addWrench(series, out);
   addDrift(series, out);
   addTiming(series, out);

@@ -19,44 +19,72 @@ experiment_t describe(const Experiment& experiment, const Identity& from, std::i
   return m;
 }
 
-RunResult runLockstep(const Experiment& experiment, LogWriter* log, const Watch& watch,
+RunResult runRecorded(const Experiment& experiment, RunRecorder* recorder, const Watch& watch,
                       Request first) {
   const Identity controller{1, 0}, machine{2, 0};
   Lockstep loop(experiment.controller, experiment.plant);
   RunMonitor monitor(experiment.controller);
   const auto time = [&] { return loop.plant().time(); };
-  const auto record = [&](const std::string& channel, const auto& message) {
-    if (log) log->write(channel, message, time());
-  };
-  record(channel::kExperiment, describe(experiment, controller, 0));
+  if (recorder) recorder->begin(describe(experiment, controller, 0));
 
   const std::int64_t start = monotonicNow();
   std::int64_t orders = 0;
   for (loop.input.order.request = first;; loop.advance()) {
     const TickState& state = loop.tick();
-    if (log) {
+    if (recorder) {
       const header_t h = header(controller, state.tick, time());
-      record(channel::kTruth,
-             toMessage(loop.plant().truth(), header(machine, loop.sample().sequence, time())));
-      record(channel::kSample, toMessage(loop.sample(), machine, state.tick - 1));
-      record(channel::kState, toMessage(state, loop.input, h));
-      record(channel::kLegCommand, toMessage(state.command, h));
+      recorder->tick(
+          {toMessage(loop.plant().truth(), header(machine, loop.sample().sequence, time())),
+           toMessage(loop.sample(), machine, state.tick - 1), toMessage(state, loop.input, h),
+           toMessage(state.command, h)},
+          time());
     }
     Order& order = loop.input.order;
     order = watch ? watch(state) : Order();
     if (monitor.reached(state, order.request)) break;
     if (order.request == Request::kRun) {
       order.id = {controller.source, orders++};
-      record(channel::kOperator,
-             toMessage(order, controller.source, header(controller, order.id.sequence, time())));
+      if (recorder)
+        recorder->order(
+            toMessage(order, controller.source, header(controller, order.id.sequence, time())),
+            time());
     }
   }
-  RunResult result = monitor.result(monotonicNow() - start);
-  if (log) {
-    log->flush();
-    result.log_lost = log->lost();
-    result.log_trouble = log->trouble();
+  return monitor.result(monotonicNow() - start);
+}
+
+namespace {
+
+class LogRecorder : public RunRecorder {
+ public:
+  explicit LogRecorder(LogWriter& log) : log_(log) {}
+  void begin(const experiment_t& experiment) override {
+    log_.write(channel::kExperiment, experiment, 0);
   }
+  void tick(const TickMessages& m, std::int64_t time) override {
+    log_.write(channel::kTruth, m.truth, time);
+    log_.write(channel::kSample, m.sample, time);
+    log_.write(channel::kState, m.state, time);
+    log_.write(channel::kLegCommand, m.command, time);
+  }
+  void order(const operator_t& order, std::int64_t time) override {
+    log_.write(channel::kOperator, order, time);
+  }
+
+ private:
+  LogWriter& log_;
+};
+
+}  // namespace
+
+RunResult runLockstep(const Experiment& experiment, LogWriter* log, const Watch& watch,
+                      Request first) {
+  if (!log) return runRecorded(experiment, nullptr, watch, first);
+  LogRecorder recorder(*log);
+  RunResult result = runRecorded(experiment, &recorder, watch, first);
+  log->flush();
+  result.log_lost = log->lost();
+  result.log_trouble = log->trouble();
   return result;
 }
 

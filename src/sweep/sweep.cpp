@@ -83,10 +83,10 @@ std::string headerOf(const SweepPlan& plan) {
   return line;
 }
 
-/// One run, as its row. `log` is a file to use in between.
-std::string rowOf(const SweepPlan& plan, const SweepOptions& options, std::int64_t run,
-                  const std::string& log) {
-  std::vector<std::string> all = options.overrides;
+/// One run, as its row.
+std::string rowOf(const SweepPlan& plan, const Value& scenario, std::int64_t run,
+                  ReferenceMotions& references) {
+  std::vector<std::string> all;
   std::string row = fmt::format("{}", run);
   for (const std::string& one : plan.overrides(run)) {
     all.push_back(one);
@@ -94,17 +94,14 @@ std::string rowOf(const SweepPlan& plan, const SweepOptions& options, std::int64
   }
   const std::string rest = std::string(std::size(kNumbers), ',');
   try {
-    Experiment e = loadExperiment(options.scenario, all);
+    Experiment e = buildExperiment(scenario, all);
     const std::string diverges =
         wantsAdmittance(e.controller.program) ? applyStabilityCheck(e) : std::string();
     if (e.controller.stability == Stability::kUnstable)
       return row + ",refused," + cell(diverges) + "," + rest;
-    RunResult result;
-    {
-      LogWriter writer(log);
-      result = runLockstep(e, &writer, {});
-    }
-    const auto summary = summarise(readSeries(log), result);
+    const RecordedRun recorded = recordLockstep(e);
+    const RunResult& result = recorded.result;
+    const auto summary = summarise(recorded.series, result, references);
     row += fmt::format(",{},{},{}", result.aborted ? "aborted" : name(result.phase),
                        name(result.cause), result.cause_tick);
     for (const char* number : kNumbers)
@@ -118,7 +115,7 @@ std::string rowOf(const SweepPlan& plan, const SweepOptions& options, std::int64
 /// Workers that take the next run from a counter they share, and send rows through one pipe.
 class Workers {
  public:
-  Workers(const SweepPlan& plan, const SweepOptions& options,
+  Workers(const SweepPlan& plan, const Value& scenario, int workers,
           const std::vector<std::int64_t>& missing, int lock)
       : next_(static_cast<std::atomic<std::size_t>*>(mmap(nullptr, sizeof(std::atomic<std::size_t>),
                                                           PROT_READ | PROT_WRITE,
@@ -126,7 +123,7 @@ class Workers {
     if (next_ == MAP_FAILED || pipe2(pipe_, O_CLOEXEC) != 0)
       throw InputError(fmt::format("--workers: {}", std::strerror(errno)));
     new (next_) std::atomic<std::size_t>(0);
-    for (int w = 0; w < options.workers; ++w) {
+    for (int w = 0; w < workers; ++w) {
       const pid_t parent = getpid(), child = fork();
       if (child < 0) throw InputError(fmt::format("--workers: {}", std::strerror(errno)));
       if (child == 0) {
@@ -134,7 +131,7 @@ class Workers {
         prctl(PR_SET_PDEATHSIG, SIGKILL);
         close(lock);
         close(pipe_[0]);
-        work(plan, options, missing, parent);
+        work(plan, scenario, missing, parent);
       }
       children_.push_back(child);
     }
@@ -168,28 +165,24 @@ class Workers {
   }
 
  private:
-  [[noreturn]] void work(const SweepPlan& plan, const SweepOptions& options,
+  [[noreturn]] void work(const SweepPlan& plan, const Value& scenario,
                          const std::vector<std::int64_t>& missing, pid_t parent) {
     ::signal(SIGINT, SIG_IGN);  // the parent ends it, between two runs
     ::signal(SIGTERM, SIG_IGN);
     ::signal(SIGPIPE, SIG_IGN);
-    const std::string log = (fs::temp_directory_path() / fmt::format("ves-sweep-{}", getpid()));
+    ReferenceMotions references;
     try {
       for (std::size_t at; (at = next_->fetch_add(1)) < missing.size() && getppid() == parent;) {
-        const std::string line = rowOf(plan, options, missing[at], log) + "\n";
+        const std::string line = rowOf(plan, scenario, missing[at], references) + "\n";
         for (std::size_t sent = 0; sent < line.size();) {
           const ssize_t n = ::write(pipe_[1], line.data() + sent, line.size() - sent);
-          if (n <= 0) {  // nobody listens
-            unlink(log.c_str());
-            _exit(1);
-          }
+          if (n <= 0) _exit(1);  // nobody listens
           sent += static_cast<std::size_t>(n);
         }
       }
     } catch (const std::exception& error) {
       fmt::print(stderr, "ves sweep: a worker ended: {}\n", error.what());
     }
-    unlink(log.c_str());
     _exit(0);
   }
 
@@ -297,14 +290,14 @@ SweepResult sweep(const SweepPlan& plan, const SweepOptions& options,
   const std::int64_t start = monotonicNow();
   if (!missing.empty()) {
     std::ofstream out(part, std::ios::binary | std::ios::app);
-    Workers workers(plan, options, missing, lock);
+    Value scenario = loadDocument(options.scenario);
+    for (const std::string& one : options.overrides) applyOverride(scenario, one);
+    Workers workers(plan, scenario, options.workers, missing, lock);
     while (!stop()) {
       const std::string row = workers.row();
       if (row.empty()) {
         if (progress.done < progress.of)
-          throw InputError(
-              "--workers: they ended before their work did (no room for their files in " +
-              fs::temp_directory_path().string() + "?)");
+          throw InputError("--workers: they ended before their work did");
         break;
       }
       out << row << '\n' << std::flush;

@@ -36,15 +36,7 @@ Experiment Reproduction::load(const std::string& scenario, const Overrides& set)
 
 Reproduction::Run Reproduction::record(const std::string& name, const Experiment& e) {
   progress_(name, ++runs_);
-  const fs::path log = scratch / "run.lcmlog";
-  Run out;
-  {
-    LogWriter writer(log.string());
-    out.result = runLockstep(e, &writer, {});
-  }
-  out.series = readSeries(log.string());
-  fs::remove(log);
-  return out;
+  return recordLockstep(e);
 }
 
 Line lineOf(const std::string& name, const Series& series, SegmentKind kind, int colour,

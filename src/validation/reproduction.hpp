@@ -34,10 +34,7 @@ Overrides with(Overrides a, const Overrides& b);
 
 class Reproduction {
  public:
-  struct Run {
-    Series series;
-    RunResult result;
-  };
+  using Run = RecordedRun;
 
   /// Throws InputError where `config` has no claims.yaml.
   Reproduction(std::filesystem::path config, const std::filesystem::path& folder,

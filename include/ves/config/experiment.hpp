@@ -31,7 +31,8 @@ struct Experiment {
   std::optional<CalibrationRecord> calibration;  // that the bias comes from
   std::string setup;     // hash of what a calibration depends on: sensor, robot, gravity
   int substitutes = 0;   // [-] numbers that stand in for unknown ones
-  std::string resolved;  // YAML with everything inside, URDF too; parseExperiment() reads it back
+  Value document;        // what it was built from, everything inside
+  std::string resolved;  // the same as YAML with everything inside, URDF too; parseExperiment() reads it back
   std::string hash;      // of `resolved`
 };
 
@@ -42,6 +43,9 @@ Experiment loadExperiment(const std::filesystem::path& file,
                           const std::filesystem::path& calibration = {},
                           const std::filesystem::path& masses = {},
                           const std::filesystem::path& servo = {});
+
+/// The same from a document that is in memory.
+Experiment buildExperiment(Value document, const std::vector<std::string>& overrides = {});
 
 /// Reads back what Experiment::resolved holds; `name` stands for a file name in messages.
 Experiment parseExperiment(const std::string& resolved, const std::string& name);

@@ -18,6 +18,11 @@ struct ModalModel {
   Eigen::MatrixXd Phi;        // 6 x k, mass-normalised mode shapes at the platform, m or rad
   Eigen::VectorXd stiffness;  // k, [1/s^2] omega^2
   Eigen::MatrixXd damping;    // k x k, [1/s] diagonal (2 zeta omega) when it is proportional
+
+  bool operator==(const ModalModel& other) const {
+    return stiffness.size() == other.stiffness.size() && Phi == other.Phi &&
+           stiffness == other.stiffness && damping == other.damping;
+  }
 };
 
 /// Exact over a length of time under a held modal force u: {eta, eta'} <- Phi {eta, eta'} + Gamma

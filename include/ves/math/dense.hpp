@@ -4,11 +4,15 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <complex>
 
 namespace ves {
 
 /// Of a square matrix, in no order.
 Eigen::VectorXcd eigenvalues(const Eigen::MatrixXd& A);
+
+/// Of an eigenvalue that is known to rounding, by inverse iteration; of length one.
+Eigen::VectorXcd eigenvector(const Eigen::MatrixXd& A, std::complex<double> eigenvalue);
 
 /// Of a symmetric matrix, the smallest first. Reads the lower triangle.
 Eigen::VectorXd symmetricEigenvalues(const Eigen::MatrixXd& A);

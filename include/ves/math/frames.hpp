@@ -36,6 +36,8 @@ inline constexpr double kSecondPerNanosecond = 1e-9;  // [s]
 struct Transform {
   Mat3 R = Mat3::Identity();  // [-]
   Vec3 p = Vec3::Zero();      // [m]
+
+  bool operator==(const Transform&) const = default;
 };
 
 /// X_AC = X_AB * X_BC.

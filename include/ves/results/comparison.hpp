@@ -3,6 +3,7 @@
 // The platform's motion in an admittance segment beside SRMS-robot's (section 4.3).
 #pragma once
 
+#include <deque>
 #include <optional>
 #include <vector>
 
@@ -43,9 +44,32 @@ struct Emulation {
   Motion base;      // the robot on its base in free space (SRMS-robot, nothing left out)
 };
 
+/// The base's motions that were needed last. Runs that differ in noise, gains or filters share one:
+/// it depends on nothing but what is compared here.
+class ReferenceMotions {
+ public:
+  /// SRMS-robot with nothing left out, the modes at rest at eta. None where the motion grows
+  /// without bound.
+  const std::optional<Motion>& of(const Interaction& interaction, std::int64_t step,
+                                  std::int64_t duration, const Eigen::VectorXd& eta);
+  int computed() const { return computed_; }  // [-]
+
+ private:
+  static constexpr std::size_t kKept = 4;
+  struct Known {
+    Interaction interaction;
+    std::int64_t step, duration;  // [ns]
+    Eigen::VectorXd eta;
+    std::optional<Motion> motion;
+  };
+  std::deque<Known> known_;
+  int computed_ = 0;
+};
+
 /// From where the platform was let go; what the modes do not express of that is left out. None
 /// without admittance control, where so many modes are kept that it would take longer than the run,
 /// and where the base's motion grows without bound.
+std::optional<Emulation> emulation(const Series& series, ReferenceMotions& references);
 std::optional<Emulation> emulation(const Series& series);
 
 /// A mode of base and robot together, the robot's joints locked.

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "ves/config/experiment.hpp"
+#include "ves/run/run.hpp"
 #include "ves/transport/event_log.hpp"
 #include "ves/transport/messages.hpp"
 
@@ -41,6 +41,9 @@ class RowMaker {
  public:
   /// A row is whole when the next state arrives: what belongs to it has been seen by then.
   std::optional<Row> add(const LogEvent& event, const std::string& log);
+  void add(const truth_t& truth) { truths_.put(truth.header.sequence, truth); }
+  void add(const sample_t& sample) { samples_.put(sample.header.sequence, sample); }
+  std::optional<Row> add(const state_t& state);
   /// The last one.
   std::optional<Row> finish() { return std::exchange(row_, std::nullopt); }
 
@@ -54,6 +57,13 @@ class RowMaker {
 /// The first controller's run in a log. Damage is passed over and told. Throws InputError when the
 /// file is no log, or a log without its configuration or a tick.
 Series readSeries(const std::string& log);
+
+/// A run in lockstep as rows, without a log between: the same rows.
+struct RecordedRun {
+  Series series;
+  RunResult result;
+};
+RecordedRun recordLockstep(const Experiment& experiment);
 
 /// A column of the table; its name ends with its unit.
 struct Column {

@@ -6,13 +6,15 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "ves/results/series.hpp"
+#include "ves/results/comparison.hpp"
 #include "ves/run/run.hpp"
 
 namespace ves {
 
 /// Named numbers, the unit at the end of each name. Errors are where the platform should be at a
 /// tick minus where it is, over the trajectory and admittance segments of the program.
+nlohmann::ordered_json summarise(const Series& series, const RunResult& result,
+                                 ReferenceMotions& references);
 nlohmann::ordered_json summarise(const Series& series, const RunResult& result);
 
 /// The summary as a person reads it.

@@ -15,6 +15,8 @@ struct RobotMove {
   int joint = 0;          // [-] from 0
   double target = 0.0;    // [rad | m]
   double duration = 1.0;  // [s]
+
+  bool operator==(const RobotMove&) const = default;
 };
 
 /// Trajectory generation of a robot (report, chapter 3): every joint on its own polynomial.

@@ -18,6 +18,7 @@ struct Payload {
   RobotModel robot;
 
   Transform X_PL0() const { return X_PR * X_RL0; }
+  bool operator==(const Payload&) const = default;
 };
 
 /// The robot with the sensor's top plate and the adapter plate counted into its link 0.

@@ -18,6 +18,8 @@ struct RigidBody {
   double mass = 0.0;              // [kg]
   Vec3 p_BoBcm_B = Vec3::Zero();  // [m] centre of mass
   Mat3 I_Bcm_B = Mat3::Zero();    // [kg m^2] about the centre of mass
+
+  bool operator==(const RigidBody&) const = default;
 };
 
 /// One body of both, expressed in A; B's frame is posed in A.
@@ -36,6 +38,8 @@ struct Link {
   double lower = 0.0;         // [rad | m] joint range
   double upper = 0.0;         // [rad | m]
   RigidBody body;
+
+  bool operator==(const Link&) const = default;
 };
 
 /// Links 1..n on a fixed base link 0, whose frame is L0.
@@ -45,6 +49,7 @@ struct RobotModel {
   std::array<Link, kMaxJoints> links{};
 
   const Link& link(int i) const { return links[static_cast<std::size_t>(i)]; }
+  bool operator==(const RobotModel&) const = default;
 };
 
 /// Joint values; entries from `joints` on are zero.

@@ -38,9 +38,28 @@ using Watch = std::function<Order(const TickState&)>;
 
 experiment_t describe(const Experiment& experiment, const Identity& from, std::int64_t time);
 
+/// What a tick in lockstep says, as a bus would carry it.
+struct TickMessages {
+  truth_t truth;
+  sample_t sample;
+  state_t state;
+  leg_command_t command;
+};
+
+/// Takes what a run in lockstep says.
+class RunRecorder {
+ public:
+  virtual ~RunRecorder() = default;
+  virtual void begin(const experiment_t& experiment) = 0;
+  virtual void tick(const TickMessages& messages, std::int64_t time) = 0;  // [ns]
+  virtual void order(const operator_t& order, std::int64_t time) = 0;
+};
+
 /// The experiment in one process without a bus, as fast as it goes; bit-identical for one seed.
 /// `first` is the order of the first tick.
 RunResult runLockstep(const Experiment& experiment, LogWriter* log, const Watch& watch,
+                      Request first = Request::kStart);
+RunResult runRecorded(const Experiment& experiment, RunRecorder* recorder, const Watch& watch,
                       Request first = Request::kStart);
 
 struct ProcessOptions {

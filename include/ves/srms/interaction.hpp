@@ -23,6 +23,8 @@ namespace ves {
 struct TimedMove {
   std::int64_t start = 0;  // [ns]
   RobotMove move;
+
+  bool operator==(const TimedMove&) const = default;
 };
 
 /// The two that meet.
@@ -31,6 +33,8 @@ struct Interaction {
   Payload payload;                       // what stands on it
   JointVector q0 = JointVector::Zero();  // [rad | m]
   std::vector<TimedMove> moves;          // by time
+
+  bool operator==(const Interaction&) const = default;
 };
 
 enum class InteractionModel { kSplit, kWhole };
