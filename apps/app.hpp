@@ -16,6 +16,7 @@
 #include <filesystem>
 #include <iostream>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "ves/config/experiment.hpp"
@@ -39,6 +40,14 @@ inline CLI::Validator inRange(double lo, double hi) {
                        : fmt::format("'{}', want a number in [{}, {}]", text, lo, hi);
           },
           fmt::format("in [{}, {}]", lo, hi)};
+}
+
+inline int allCores() {
+  return static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+}
+
+inline void addWorkers(CLI::App& cli, int& workers, const std::string& what) {
+  cli.add_option("--workers", workers, what)->check(CLI::Range(1, 1024))->capture_default_str();
 }
 
 /// Ctrl-C, SIGTERM and a terminal that closes ask for a gentle end. A closed pipe ends nothing.

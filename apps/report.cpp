@@ -13,17 +13,18 @@ namespace ves::app {
 int reportCommand(int argc, char** argv) {
   CLI::App cli(
       "Runs every scenario of the report's chapter 4 in lockstep and leaves report.html, one page "
-      "that "
-      "needs nothing beside it, and summary.json.",
+      "that needs nothing beside it, and summary.json. The same bytes for any number of workers.",
       "ves report");
   std::string out = "ves-runs/report";
   cli.add_option("--out", out, "folder for the results")->capture_default_str();
+  int workers = allCores();
+  addWorkers(cli, workers, "threads");
   return run(cli, argc, argv, [&] {
     const std::filesystem::path folder = claimFolder(out);
     const bool terminal = isatty(STDERR_FILENO);
     const std::int64_t start = monotonicNow();
     const Chapter4 chapter =
-        reproduceChapter4(configFolder(), folder, [&](const std::string& what, int run) {
+        reproduceChapter4(configFolder(), folder, workers, [&](const std::string& what, int run) {
           fmt::print(stderr, "{}run {:3}  {:<32}{}", terminal ? "\r" : "", run, what,
                      terminal ? "" : "\n");
         });

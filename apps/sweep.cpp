@@ -3,8 +3,6 @@
 // ves sweep: one scenario over many values.
 #include <unistd.h>
 
-#include <thread>
-
 #include "commands.hpp"
 #include "runner.hpp"
 #include "ves/sweep/sweep.hpp"
@@ -47,7 +45,7 @@ int sweepCommand(int argc, char** argv) {
   std::int64_t runs = 1;
   std::uint64_t seed = 1;
   const auto [rank, ranks] = place();
-  int workers = ranks > 1 ? 1 : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  int workers = ranks > 1 ? 1 : allCores();
   cli.add_option("scenario", scenario, "name in config/scenarios, or a .yaml file")->required();
   cli.add_option("--vary", vary, "KEY=V1,V2,.. or KEY=FROM:TO:COUNT")->allow_extra_args(false);
   cli.add_option("--draw", draw, "KEY=FROM:TO, uniform, another one each run")
@@ -59,9 +57,7 @@ int sweepCommand(int argc, char** argv) {
       ->check(CLI::Range(std::int64_t{0}, std::int64_t{UINT32_MAX}))
       ->capture_default_str();
   cli.add_option("--set", sets, "KEY.PATH=VALUE of every run")->allow_extra_args(false);
-  cli.add_option("--workers", workers, "processes")
-      ->check(CLI::Range(1, 1024))
-      ->capture_default_str();
+  addWorkers(cli, workers, "processes");
   cli.add_option("--out", out, "folder; ves-runs/sweep-SCENARIO by default");
   return run(cli, argc, argv, [&, rank = rank, ranks = ranks] {
     SweepPlan plan;

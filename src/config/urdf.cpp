@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <mutex>
 
 #include "ves/config/document.hpp"
 #include "ves/math/dense.hpp"
@@ -14,15 +15,22 @@
 namespace ves {
 namespace {
 
-/// Keeps what urdfdom would print.
+/// Keeps what urdfdom would print; one at a time, as it prints through one place.
 class Messages : public console_bridge::OutputHandler {
  public:
-  Messages() { console_bridge::useOutputHandler(this); }
+  Messages() : alone_(place()) { console_bridge::useOutputHandler(this); }
   ~Messages() override { console_bridge::restorePreviousOutputHandler(); }
   void log(const std::string& text, console_bridge::LogLevel level, const char*, int) override {
     if (level >= console_bridge::CONSOLE_BRIDGE_LOG_ERROR && first.empty()) first = text;
   }
   std::string first;
+
+ private:
+  static std::mutex& place() {
+    static std::mutex mutex;
+    return mutex;
+  }
+  std::lock_guard<std::mutex> alone_;
 };
 
 Transform toTransform(const urdf::Pose& pose) {
@@ -83,8 +91,8 @@ class Loader {
       if (first == '/')
         --depth;
       else if (first != '?' && first != '!' && text_[end - 1] != '/' && ++depth > kMaxElementDepth)
-        throw InputError(
-            fmt::format("{}:{}: elements nested deeper than {}", file_, lineAt(at), kMaxElementDepth));
+        throw InputError(fmt::format("{}:{}: elements nested deeper than {}", file_, lineAt(at),
+                                     kMaxElementDepth));
       at = end;
     }
   }

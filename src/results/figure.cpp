@@ -15,6 +15,7 @@
 namespace ves {
 namespace {
 
+constexpr const char* kNoFigure = "<p>(gnuplot could not draw this figure)</p>";
 constexpr std::size_t kMostPoints = 700;  // [-] of a line: more than it has pixels
 
 /// Lines thinned by keeping the extremes of each run of points, so that no peak is lost.
@@ -86,15 +87,15 @@ std::string svg(const std::vector<Panel>& panels) {
   }
   script += "unset multiplot\nunset output\n";
 
-  const std::filesystem::path folder =
-      std::filesystem::temp_directory_path() / fmt::format("ves-figure-{}", getpid());
-  std::filesystem::create_directories(folder);
+  std::string name = (std::filesystem::temp_directory_path() / "ves-figure-XXXXXX").string();
+  if (!mkdtemp(name.data())) return kNoFigure;
+  const std::filesystem::path folder = name;
   gnuplot(script, folder);
   std::ostringstream text;
   text << std::ifstream(folder / "figure.svg").rdbuf();
   std::filesystem::remove_all(folder);
   std::string out = text.str();
-  if (out.find("</svg>") == std::string::npos) return "<p>(gnuplot could not draw this figure)</p>";
+  if (out.find("</svg>") == std::string::npos) return kNoFigure;
 
   out.erase(0, out.find("<svg"));
   out = std::regex_replace(out, std::regex("<title>[^<]*</title>\\s*|<desc>[^<]*</desc>\\s*"), "");

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/srms/interaction.hpp"
 
-#include <gsl/gsl_errno.h>
 #include <gsl/gsl_odeiv2.h>
 
 #include <algorithm>
 #include <memory>
 #include <stdexcept>
 
+#include "gsl_errors.hpp"
 #include "ves/math/dense.hpp"
 #include "ves/robot/newton_euler.hpp"
 
@@ -163,6 +163,7 @@ std::vector<InteractionPoint> simulate(const Interaction& interaction,
   const std::unique_ptr<gsl_odeiv2_driver, FreeDriver> driver(gsl_odeiv2_driver_alloc_y_new(
       &system, gsl_odeiv2_step_rk8pd, 1e-3, options.tolerance * milli, options.tolerance));
 
+  returnGslErrors();
   std::vector<InteractionPoint> out;
   auto move = interaction.moves.begin();
   std::int64_t now = 0;
@@ -177,10 +178,8 @@ std::vector<InteractionPoint> simulate(const Interaction& interaction,
       if (move != interaction.moves.end()) until = std::min(until, move->start);
       double later = 0.0;
       gsl_odeiv2_driver_reset(driver.get());
-      gsl_error_handler_t* const before = gsl_set_error_handler_off();
       const int status = gsl_odeiv2_driver_apply(
           driver.get(), &later, static_cast<double>(until - now) * kSecondPerNanosecond, y.data());
-      gsl_set_error_handler(before);
       if (status != GSL_SUCCESS)
         throw std::domain_error(
             "the tolerance cannot be kept: the motion grows without bound, or "

@@ -2,11 +2,12 @@
 #include "ves/srms/modes.hpp"
 
 #include <gsl/gsl_eigen.h>
-#include <gsl/gsl_errno.h>
 
 #include <cmath>
 #include <memory>
 #include <stdexcept>
+
+#include "gsl_errors.hpp"
 
 namespace ves {
 namespace {
@@ -39,9 +40,8 @@ Eigenmodes eigenmodes(const Eigen::MatrixXd& M, const Eigen::MatrixXd& K) {
   const std::unique_ptr<gsl_matrix, FreeMatrix> vectors(gsl_matrix_alloc(n, n));
   const std::unique_ptr<gsl_eigen_gensymmv_workspace, FreeWorkspace> work(
       gsl_eigen_gensymmv_alloc(n));
-  gsl_error_handler_t* const before = gsl_set_error_handler_off();
+  returnGslErrors();
   const int status = gsl_eigen_gensymmv(a.get(), b.get(), values.get(), vectors.get(), work.get());
-  gsl_set_error_handler(before);
   if (status) throw std::domain_error("the mass matrix is not positive definite");
   gsl_eigen_gensymmv_sort(values.get(), vectors.get(), GSL_EIGEN_SORT_VAL_ASC);
 

@@ -44,11 +44,10 @@ Claims::Claims(const std::filesystem::path& file) : file_(file.string()) {
   root.finish();
 }
 
-Claim Claims::judge(const std::string& id, const Quantities& measured) {
+Claim Claims::judge(const std::string& id, const Quantities& measured) const {
   const auto at = entries_.find(id);
   if (at == entries_.end()) throw InputError(fmt::format("{}: no claim '{}'", file_, id));
-  Entry& entry = at->second;
-  entry.judged = true;
+  const Entry& entry = at->second;
   Claim out = entry.claim;
   fmt::dynamic_format_arg_store<fmt::format_context> arguments;
   for (const auto& [quantity, value] : measured)
@@ -71,10 +70,9 @@ Claim Claims::judge(const std::string& id, const Quantities& measured) {
   return out;
 }
 
-std::vector<std::string> Claims::open() const {
+std::vector<std::string> Claims::ids() const {
   std::vector<std::string> out;
-  for (const auto& [id, entry] : entries_)
-    if (!entry.judged) out.push_back(id);
+  for (const auto& [id, entry] : entries_) out.push_back(id);
   return out;
 }
 

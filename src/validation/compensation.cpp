@@ -114,40 +114,51 @@ void addedDamping(Reproduction& r, const std::string& scenario, const std::strin
   table.push_back(row);
 }
 
-/// The eight runs of 4.3 beside the robot on its base in free space.
-void onTheArm(Reproduction& r) {
-  Numbers& n = r.numbers["beyond"];
+/// One of the eight runs of 4.3 beside the robot on its base in free space: rows of tables. Lines
+/// of `distances` for the run that the figure shows.
+void oneOnTheArm(Reproduction& r, const Run43& which, TableRows& rows, TableRows& damping,
+                 Panel& distances) {
+  const std::string scenario = "srms_" + which.configuration + "_" + which.robot,
+                    what = title(which.configuration, which.robot);
   const Overrides quiet = {"sensor.noise=false"},
                   six = {"base.keep_modes=6", "controller.stability=forced"};
   const Overrides all = compensation(true, true, true);
-  TableRows rows, damping;
-  Panel distances{"time [s]", "distance [mm]", {}, false};
-  for (const std::string robot : kRobots)
-    for (const std::string configuration : kConfigurations) {
-      const std::string scenario = "srms_" + configuration + "_" + robot;
-      Numbers& own = n[scenario];
-      std::vector<std::string> row = {title(configuration, robot)};
-      const auto add = [&](const char* key, const Overrides& set) {
-        const Reproduction::Run run = r.run(scenario, set);
-        const std::optional<Emulation> e = emulation(run.series);
-        if (run.result.good()) own[key] = share(e);
-        row.push_back(ended(run, share(e)));
-        return e;
-      };
-      for (const Stage& stage : stages()) {
-        const std::optional<Emulation> e = add(stage.name, stage.set);
-        if (!e) continue;
-        if (row.size() == 2) row.insert(row.begin() + 1, mm(travel(e->base).peak_position));
-        if (scenario == "srms_deploy_doss")
-          distances.lines.push_back(distanceOverTime(*e, stage.name, distances.lines.size()));
-      }
-      add("all, no noise", with(all, quiet));
-      add("six modes, as published, no noise",
-          with(with(compensation(false, false, false), six), quiet));
-      add("six modes, all, no noise", with(with(all, six), quiet));
-      rows.push_back(row);
-      addedDamping(r, scenario, title(configuration, robot), with(all, quiet), own, damping);
-    }
+  Numbers& own = r.numbers["beyond"][scenario];
+  std::vector<std::string> row = {what};
+  const auto add = [&](const char* key, const Overrides& set) {
+    const Reproduction::Run run = r.run(scenario, set);
+    const std::optional<Emulation> e = r.emulation(run.series);
+    if (run.result.good()) own[key] = share(e);
+    row.push_back(ended(run, share(e)));
+    return e;
+  };
+  for (const Stage& stage : stages()) {
+    const std::optional<Emulation> e = add(stage.name, stage.set);
+    if (!e) continue;
+    if (row.size() == 2) row.insert(row.begin() + 1, mm(travel(e->base).peak_position));
+    if (scenario == "srms_deploy_doss")
+      distances.lines.push_back(distanceOverTime(*e, stage.name, distances.lines.size()));
+  }
+  add("all, no noise", with(all, quiet));
+  add("six modes, as published, no noise",
+      with(with(compensation(false, false, false), six), quiet));
+  add("six modes, all, no noise", with(with(all, six), quiet));
+  rows.push_back(row);
+  addedDamping(r, scenario, what, with(all, quiet), own, damping);
+}
+
+void onTheArm(Reproduction& r) {
+  TableRows rows_of[kRuns], damping_of[kRuns], rows, damping;
+  Panel distances_of[kRuns], distances{"time [s]", "distance [mm]", {}, false};
+  r.parts(kRuns, [&](Reproduction& piece, std::size_t i) {
+    oneOnTheArm(piece, runOf(i), rows_of[i], damping_of[i], distances_of[i]);
+  });
+  for (std::size_t i = 0; i < kRuns; ++i) {
+    rows.insert(rows.end(), rows_of[i].begin(), rows_of[i].end());
+    damping.insert(damping.end(), damping_of[i].begin(), damping_of[i].end());
+    distances.lines.insert(distances.lines.end(), distances_of[i].lines.begin(),
+                           distances_of[i].lines.end());
+  }
   r.page.text(
       "The platform's motion beside that of the robot on its base in free space, nothing left "
       "out: rms of the distance, percent of the base's largest motion. A run that ends itself is "
@@ -167,30 +178,29 @@ void onTheArm(Reproduction& r) {
 
 /// What the rest of the error comes from: one thing changed at a time.
 void remains(Reproduction& r) {
-  Numbers& n = r.numbers["beyond"];
-  const Overrides all = compensation(true, true, true);
-  TableRows rows;
-  const auto add = [&](const char* what, const Overrides& more) {
-    Overrides set = all;
-    set.push_back("gravity_m_per_s2=0");
-    set.insert(set.end(), more.begin(), more.end());
-    const Reproduction::Run run = r.run("srms_capture_doss", set);
-    const double reached = share(emulation(run.series));
-    n["budget"][what] = reached;
-    rows.push_back({what, ended(run, reached)});
-  };
   const char* quiet = "sensor.noise=false";
-  add("noise and counts, as it is", {});
-  add("without the sensor's noise", {quiet});
-  add("and the A/D converter four times finer",
-      {quiet, "sensor.gain=[4000,4000,4000,4000,4000,4000]"});
-  add("and 200 Hz instead of 100", {quiet, "controller.period_ns=5000000"});
-  add("without the noise, legs at the edge of their counts",
-      {quiet, "controller.compensation.observer=false", "controller.compensation.inertia=false"});
-  add("without the noise, robot 5 percent heavier than modelled",
-      {quiet, "plant_mismatch={mass: 1.05}"});
-  add("without the noise, servo gains 5 percent higher than modelled",
-      {quiet, "plant_mismatch={gain_extend: 1.05, gain_retract: 1.05}"});
+  const Stage changes[] = {
+      {"noise and counts, as it is", {}},
+      {"without the sensor's noise", {quiet}},
+      {"and the A/D converter four times finer",
+       {quiet, "sensor.gain=[4000,4000,4000,4000,4000,4000]"}},
+      {"and 200 Hz instead of 100", {quiet, "controller.period_ns=5000000"}},
+      {"without the noise, legs at the edge of their counts",
+       {quiet, "controller.compensation.observer=false", "controller.compensation.inertia=false"}},
+      {"without the noise, robot 5 percent heavier than modelled",
+       {quiet, "plant_mismatch={mass: 1.05}"}},
+      {"without the noise, servo gains 5 percent higher than modelled",
+       {quiet, "plant_mismatch={gain_extend: 1.05, gain_retract: 1.05}"}}};
+  TableRows rows(std::size(changes));
+  r.parts(std::size(changes), [&](Reproduction& piece, std::size_t i) {
+    const auto& [what, more] = changes[i];
+    const Reproduction::Run run =
+        piece.run("srms_capture_doss",
+                  with(with(compensation(true, true, true), {"gravity_m_per_s2=0"}), more));
+    const double reached = share(piece.emulation(run.series));
+    piece.numbers["beyond"]["budget"][what] = reached;
+    rows[i] = {what, ended(run, reached)};
+  });
   r.page.text("What remains, and what sets it (capture, DOSS, in space), in the same percent:");
   r.page.table({"", "rms"}, rows);
 }

@@ -21,19 +21,22 @@ void massesSection(Reproduction& r) {
       "moments that can be told apart, beside the sensor's biases. m: mass, m x, m y, m z: first "
       "moment in the link's own frame, link 0 with all plates. The last column is the error in "
       "standard deviations.");
-  Quantities found;
-  double squares = 0.0, within = 0.0, of = 0.0;
-  for (const std::string robot : kRobots) {
+  struct Found {
+    double squares = 0.0, within = 0.0, of = 0.0, rank = 0.0, parameters = 0.0;
+  } each[std::size(kRobots)];
+  r.parts(std::size(kRobots), [&](Reproduction& piece, std::size_t k) {
+    const std::string robot = kRobots[k];
+    Found& f = each[k];
     const std::string scenario = robot + "_on_table_4_1";
-    const fs::path base = fs::absolute(findScenario(scenario, r.config));
+    const fs::path base = fs::absolute(findScenario(scenario, piece.config));
     const Experiment e = loadExperiment(base);
     const StaticSetup setup = staticSetup(e.controller);
     const SeparableCombinations c = separableCombinations(setup.robot);
     const PosePlan plan = planPoses(setup, c, e.controller, e.plant.initial_joints, {});
-    const fs::path file = r.scratch / "identify.yaml";
+    const fs::path file = piece.scratch / ("identify_" + robot + ".yaml");
     constexpr double kSpeed = 30.0;  // [deg/s]
     std::ofstream(file) << scenarioOf(plan, e, "identify_" + robot, base.string(), kSpeed);
-    const Reproduction::Run run = r.record("identify " + robot, loadExperiment(file));
+    const Reproduction::Run run = piece.record("identify " + robot, loadExperiment(file));
     fs::remove(file);
     const std::vector<StaticInterval> intervals = staticIntervals(run.series);
     const MassEstimate m = estimateMasses(setup, c, intervals);
@@ -41,25 +44,34 @@ void massesSection(Reproduction& r) {
     TableRows rows;
     for (Eigen::Index i = 0; i < c.rank(); ++i) {
       const double z = (m.beta(i) - truth(i)) / m.standard_deviation(i);
-      squares += z * z;
-      within += std::abs(z) < 3.0;
-      of += 1.0;
+      f.squares += z * z;
+      f.within += std::abs(z) < 3.0;
+      f.of += 1.0;
       rows.push_back({c.names[static_cast<std::size_t>(i)], fmt::format("{:.4f}", m.beta(i)),
                       fmt::format("{:.4f}", m.standard_deviation(i)),
                       fmt::format("{:.4f}", truth(i)), fmt::format("{:+.1f}", z)});
     }
-    r.page.table({fmt::format("{}, {} poses [kg, kg m]", robot == "puma" ? "PUMA 560" : "DOSS",
-                              intervals.size()),
-                  "identified", "deviation", "truth", "error"},
-                 rows);
-    found[robot] = static_cast<double>(c.rank());
-    found[robot + "_of"] = static_cast<double>(c.C.cols());
-    Numbers& n = r.numbers["appendix_b"][robot];
+    piece.page.table({fmt::format("{}, {} poses [kg, kg m]", robot == "puma" ? "PUMA 560" : "DOSS",
+                                  intervals.size()),
+                      "identified", "deviation", "truth", "error"},
+                     rows);
+    f.rank = static_cast<double>(c.rank());
+    f.parameters = static_cast<double>(c.C.cols());
+    Numbers& n = piece.numbers["appendix_b"][robot];
     n["separable"] = c.rank();
     n["parameters"] = c.C.cols();
     n["poses"] = intervals.size();
     n["condition"] = m.condition;
     n["total_mass_error_kg"] = m.beta(0) - truth(0);
+  });
+  Quantities found;
+  double squares = 0.0, within = 0.0, of = 0.0;
+  for (std::size_t k = 0; k < std::size(kRobots); ++k) {
+    squares += each[k].squares;
+    within += each[k].within;
+    of += each[k].of;
+    found[kRobots[k]] = each[k].rank;
+    found[kRobots[k] + std::string("_of")] = each[k].parameters;
   }
   found["within"] = within;
   found["of"] = of;

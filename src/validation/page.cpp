@@ -61,55 +61,68 @@ std::string badge(Verdict verdict) {
 
 }  // namespace
 
-void Page::section(const std::string& title) {
-  body_ += fmt::format("<h2 id=\"s{}\">{}</h2>\n", ++sections_, escaped(title));
-}
+void Page::section(const std::string& title) { sections_.push_back({title, {}, {}}); }
 
 void Page::text(const std::string& paragraph) {
-  body_ += fmt::format("<p>{}</p>\n", escaped(paragraph));
+  last().body += fmt::format("<p>{}</p>\n", escaped(paragraph));
 }
 
 void Page::claim(const Claim& claim) {
-  claims_.push_back(claim);
-  section_of_claim_.push_back(sections_);
-  body_ +=
+  last().claims.push_back(claim);
+  last().body +=
       fmt::format("<div class=\"claim\"><p class=\"says\">{}: {}</p><p>{}</p><p>{}{}</p></div>\n",
                   escaped(claim.where), escaped(claim.says), escaped(claim.reached),
                   badge(claim.verdict), claim.why.empty() ? "" : ": " + escaped(claim.why));
 }
 
+void Page::append(const Page& other) {
+  const Section& first = other.sections_.front();
+  last().body += first.body;
+  last().claims.insert(last().claims.end(), first.claims.begin(), first.claims.end());
+  sections_.insert(sections_.end(), other.sections_.begin() + 1, other.sections_.end());
+}
+
+std::vector<Claim> Page::claims() const {
+  std::vector<Claim> all;
+  for (const Section& s : sections_) all.insert(all.end(), s.claims.begin(), s.claims.end());
+  return all;
+}
+
 void Page::figure(const std::string& caption, const std::vector<Panel>& panels) {
-  body_ += fmt::format("<figure>\n{}<figcaption>{}</figcaption></figure>\n", svg(panels),
-                       escaped(caption));
+  last().body += fmt::format("<figure>\n{}<figcaption>{}</figcaption></figure>\n", svg(panels),
+                             escaped(caption));
 }
 
 void Page::table(const std::vector<std::string>& header,
                  const std::vector<std::vector<std::string>>& rows) {
-  body_ += "<div class=\"scroll\"><table class=\"numbers\"><thead><tr>";
-  for (const std::string& cell : header) body_ += "<th>" + escaped(cell) + "</th>";
-  body_ += "</tr></thead><tbody>\n";
+  std::string& body = last().body;
+  body += "<div class=\"scroll\"><table class=\"numbers\"><thead><tr>";
+  for (const std::string& cell : header) body += "<th>" + escaped(cell) + "</th>";
+  body += "</tr></thead><tbody>\n";
   for (const auto& row : rows) {
-    body_ += "<tr>";
-    for (const std::string& cell : row) body_ += "<td>" + escaped(cell) + "</td>";
-    body_ += "</tr>\n";
+    body += "<tr>";
+    for (const std::string& cell : row) body += "<td>" + escaped(cell) + "</td>";
+    body += "</tr>\n";
   }
-  body_ += "</tbody></table></div>\n";
+  body += "</tbody></table></div>\n";
 }
 
 std::string Page::html(const std::string& title, const std::string& lead) const {
+  const std::vector<Claim> all = claims();
   std::string counts;
   for (const Verdict v : {Verdict::kAgrees, Verdict::kDiffers, Verdict::kCannotTell}) {
-    const auto n = std::count_if(claims_.begin(), claims_.end(),
-                                 [v](const Claim& c) { return c.verdict == v; });
+    const auto n =
+        std::count_if(all.begin(), all.end(), [v](const Claim& c) { return c.verdict == v; });
     if (n) counts += fmt::format("{}{} {}", counts.empty() ? "" : ", ", n, badge(v));
   }
-  std::string rows;
-  for (std::size_t i = 0; i < claims_.size(); ++i) {
-    const Claim& c = claims_[i];
-    rows +=
-        fmt::format("<tr><td><a href=\"#s{}\">{}</a></td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
-                    section_of_claim_[i], escaped(c.where), escaped(c.says), escaped(c.reached),
-                    badge(c.verdict));
+  std::string rows, body = sections_.front().body;
+  for (std::size_t i = 1; i < sections_.size(); ++i) {
+    body += fmt::format("<h2 id=\"s{}\">{}</h2>\n{}", i, escaped(sections_[i].title),
+                        sections_[i].body);
+    for (const Claim& c : sections_[i].claims)
+      rows += fmt::format(
+          "<tr><td><a href=\"#s{}\">{}</a></td><td>{}</td><td>{}</td><td>{}</td></tr>\n", i,
+          escaped(c.where), escaped(c.says), escaped(c.reached), badge(c.verdict));
   }
   return fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
@@ -119,7 +132,7 @@ std::string Page::html(const std::string& title, const std::string& lead) const 
       "class=\"scroll\"><table><thead><tr><th>report</th><th>claim</th>"
       "<th>reached</th><th>verdict</th></tr></thead><tbody>\n{5}</tbody></table></div>\n{6}"
       "</body></html>\n",
-      escaped(title), kStyle, escaped(lead), claims_.size(), counts, rows, body_);
+      escaped(title), kStyle, escaped(lead), all.size(), counts, rows, body);
 }
 
 }  // namespace ves

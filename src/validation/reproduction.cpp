@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "reproduction.hpp"
 
+#include <tbb/global_control.h>
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -21,12 +24,39 @@ Overrides with(Overrides a, const Overrides& b) {
   return a;
 }
 
-Reproduction::Reproduction(fs::path config_folder, const fs::path& folder,
-                           std::function<void(const std::string&, int)> progress)
+Reproduction::Reproduction(fs::path config_folder, const fs::path& folder, const Progress& progress)
     : config(std::move(config_folder)),
       scratch(folder),
-      claims(config / "claims.yaml"),
-      progress_(std::move(progress)) {}
+      shared_(new Shared{Claims(config / "claims.yaml"), progress, {}}) {}
+
+Reproduction Reproduction::piece() const {
+  Reproduction out(*this);
+  out.page = {};
+  out.numbers = {};
+  out.judged = {};
+  return out;
+}
+
+void Reproduction::append(const Reproduction& piece) {
+  page.append(piece.page);
+  if (!piece.numbers.is_null()) numbers.merge_patch(piece.numbers);
+  judged.insert(piece.judged.begin(), piece.judged.end());
+  substitutes = std::max(substitutes, piece.substitutes);
+}
+
+void Reproduction::parts(std::size_t n,
+                         const std::function<void(Reproduction&, std::size_t)>& write) {
+  std::vector<Reproduction> pieces(n, piece());
+  tbb::parallel_for(std::size_t{0}, n, [&](std::size_t i) { write(pieces[i], i); });
+  for (const Reproduction& one : pieces) append(one);
+}
+
+std::vector<std::string> Reproduction::openClaims() const {
+  std::vector<std::string> out;
+  for (const std::string& id : shared_->claims.ids())
+    if (!judged.count(id)) out.push_back(id);
+  return out;
+}
 
 Experiment Reproduction::load(const std::string& scenario, const Overrides& set) const {
   Experiment e = loadExperiment(findScenario(scenario, config), set);
@@ -35,7 +65,10 @@ Experiment Reproduction::load(const std::string& scenario, const Overrides& set)
 }
 
 Reproduction::Run Reproduction::record(const std::string& name, const Experiment& e) {
-  progress_(name, ++runs_);
+  {
+    const std::lock_guard<std::mutex> lock(shared_->mutex);
+    shared_->progress(name, ++shared_->runs);
+  }
   return recordLockstep(e);
 }
 
@@ -81,17 +114,16 @@ std::string letGo(const CoupledMode& mode) {
          "}}}, {admittance: {duration_s: 15}}]";
 }
 
-Chapter4 reproduceChapter4(const fs::path& config, const fs::path& folder,
+Chapter4 reproduceChapter4(const fs::path& config, const fs::path& folder, int workers,
                            const std::function<void(const std::string&, int)>& progress) {
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
+                                  static_cast<std::size_t>(workers));
   Reproduction r(config, folder, progress);
-  sensorSection(r);
-  ratesSection(r);
-  motionSection(r);
-  shuttleArmSection(r);
-  stabilitySection(r);
-  massesSection(r);
-  compensationSection(r);
-  if (const std::vector<std::string> open = r.claims.open(); !open.empty())
+  constexpr void (*kSections[])(Reproduction&) = {
+      sensorSection,    ratesSection,  motionSection,      shuttleArmSection,
+      stabilitySection, massesSection, compensationSection};
+  r.parts(std::size(kSections), [&](Reproduction& piece, std::size_t i) { kSections[i](piece); });
+  if (const std::vector<std::string> open = r.openClaims(); !open.empty())
     throw InputError(fmt::format("{}: claims.{}: nothing measures it",
                                  (config / "claims.yaml").string(), open.front()));
 

@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // What the sections of the page share: runs in lockstep, named numbers, claims, lines of figures.
+// Parts of it are written at once, each a piece of its own, and put together in their order.
 #pragma once
 
 #include <fmt/format.h>
 
+#include <memory>
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 
 #include "ves/base/coordinates.hpp"
 #include "ves/results/comparison.hpp"
@@ -24,6 +28,11 @@ using TableRows = std::vector<std::vector<std::string>>;
 inline constexpr double kMilli = 1e3;  // [1/m] millimetres
 inline constexpr const char* kConfigurations[] = {"unberth", "low_hover", "deploy", "capture"};
 inline constexpr const char* kRobots[] = {"puma", "doss"};
+inline constexpr std::size_t kRuns = 8;  // [-] of 4.3, in its order
+struct Run43 {
+  std::string configuration, robot;
+};
+inline Run43 runOf(std::size_t i) { return {kConfigurations[i % 4], kRobots[i / 4]}; }
 
 inline std::string mm(double x) { return fmt::format("{:.2f}", x * kMilli); }
 inline std::string percent(double x) { return fmt::format("{:.2f}", 100.0 * x); }
@@ -36,9 +45,15 @@ class Reproduction {
  public:
   using Run = RecordedRun;
 
+  /// Told each run's name and number, by one thread at a time.
+  using Progress = std::function<void(const std::string&, int)>;
+
   /// Throws InputError where `config` has no claims.yaml.
   Reproduction(std::filesystem::path config, const std::filesystem::path& folder,
-               std::function<void(const std::string&, int)> progress);
+               const Progress& progress);
+
+  /// Calls write(piece, i) for every i below n, on all workers, and appends the pieces in order.
+  void parts(std::size_t n, const std::function<void(Reproduction&, std::size_t)>& write);
 
   /// A scenario with changes, its stability checked.
   Experiment load(const std::string& scenario, const Overrides& set = {}) const;
@@ -46,22 +61,38 @@ class Reproduction {
     return record(scenario, load(scenario, set));
   }
   Run record(const std::string& name, const Experiment& e);
+  /// The platform beside its base, where the base's motion is known from other runs too.
+  std::optional<Emulation> emulation(const Series& series) {
+    return ves::emulation(series, references_);
+  }
 
   /// Puts the claim with these numbers onto the page.
   void claim(const std::string& id, const Quantities& measured) {
-    page.claim(claims.judge(id, measured));
+    page.claim(shared_->claims.judge(id, measured));
+    judged.insert(id);
   }
+  std::vector<std::string> openClaims() const;
 
   std::filesystem::path config;   // folder of the scenarios
   std::filesystem::path scratch;  // folder for what lies between
   Page page;
-  Claims claims;
   Numbers numbers;
-  int substitutes = 0;  // [-] most in a run
+  std::set<std::string> judged;  // claims
+  int substitutes = 0;           // [-] most in a run
 
  private:
-  std::function<void(const std::string&, int)> progress_;
-  int runs_ = 0;
+  /// Of all pieces.
+  struct Shared {
+    Claims claims;
+    Progress progress;
+    std::mutex mutex;
+    int runs = 0;
+  };
+  Reproduction piece() const;  // empty, of the same whole
+  void append(const Reproduction& piece);
+
+  std::shared_ptr<Shared> shared_;
+  ReferenceMotions references_;
 };
 
 /// A line of a panel: what the rows of segments of one kind show.

@@ -23,6 +23,23 @@ struct EightRuns {
   double largest = 0.0, largest_half = 0.0;           // [m] stiffness as estimated, half of it
   double smallest_doss = HUGE_VAL, largest_doss = 0;  // [m]
   double least_added = HUGE_VAL;                      // [-] damping ratio
+
+  void add(const EightRuns& one) {
+    const auto join = [](TableRows& all, const TableRows& more) {
+      all.insert(all.end(), more.begin(), more.end());
+    };
+    join(distances, one.distances);
+    join(attitudes, one.attitudes);
+    join(damping, one.damping);
+    join(sizes, one.sizes);
+    worst_puma = std::max(worst_puma, one.worst_puma);
+    worst_split = std::max(worst_split, one.worst_split);
+    largest = std::max(largest, one.largest);
+    largest_half = std::max(largest_half, one.largest_half);
+    smallest_doss = std::min(smallest_doss, one.smallest_doss);
+    largest_doss = std::max(largest_doss, one.largest_doss);
+    least_added = std::min(least_added, one.least_added);
+  }
 };
 
 Motion simulated(const Experiment& e, InteractionModel model) {
@@ -240,15 +257,15 @@ void shuttleArmSection(Reproduction& r) {
       "wrench measured, the modes stepped at 100 Hz, the platform moved. Both keep the same modes: "
       "as many as the machine's loop holds stable. Distances are of the commanded motion, as in "
       "the report, and Euclidean.");
-  EightRuns all;
-  int figure = 11;
-  for (const std::string robot : kRobots)
-    for (const std::string configuration : kConfigurations) {
-      const Motion srms = onTheArmAlone(r, configuration, robot, all);
-      onTheMachine(r, configuration, robot, srms, figure, all);
-      ringDowns(r, configuration, robot, all);
-      figure += 2;
-    }
+  EightRuns runs[kRuns], all;
+  r.parts(kRuns, [&](Reproduction& piece, std::size_t i) {
+    const auto& [configuration, robot] = runOf(i);
+    const int figure = 11 + 2 * static_cast<int>(i);
+    const Motion srms = onTheArmAlone(piece, configuration, robot, runs[i]);
+    onTheMachine(piece, configuration, robot, srms, figure, runs[i]);
+    ringDowns(piece, configuration, robot, runs[i]);
+  });
+  for (const EightRuns& one : runs) all.add(one);
   r.claim("puma_on_srms",
           {{"error_percent", 100.0 * all.worst_puma}, {"least_added", all.least_added}});
   r.claim("doss_on_srms",

@@ -15,9 +15,11 @@ struct Chapter4 {
   nlohmann::ordered_json summary;  // the claims, and named numbers with the unit in the name
 };
 
-/// Runs the scenarios of `config`, its logs passing through `folder`. `progress` is told each run's
-/// name and number. Throws InputError.
+/// Runs the scenarios of `config` on `workers` threads; the result is the same for any number of
+/// them. Files in between lie in `folder`. `progress` is told each run's name and number, by one
+/// thread at a time. Throws InputError.
 Chapter4 reproduceChapter4(const std::filesystem::path& config, const std::filesystem::path& folder,
+                           int workers,
                            const std::function<void(const std::string&, int)>& progress);
 
 }  // namespace ves

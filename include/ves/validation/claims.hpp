@@ -37,16 +37,14 @@ class Claims {
 
   /// The claim with its numbers and a verdict. NaN is in no range. Throws InputError for an `id`
   /// that the file does not have, and for a quantity it names that is not given.
-  Claim judge(const std::string& id, const Quantities& measured);
+  Claim judge(const std::string& id, const Quantities& measured) const;
 
-  /// Those that nobody has judged yet.
-  std::vector<std::string> open() const;
+  std::vector<std::string> ids() const;
 
  private:
   struct Entry {
     Claim claim;  // `reached` with its braces
     std::map<std::string, std::pair<double, double>> agrees;
-    bool judged = false;
   };
   std::string file_;
   std::map<std::string, Entry> entries_;

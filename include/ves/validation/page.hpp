@@ -23,14 +23,20 @@ class Page {
   void table(const std::vector<std::string>& header,
              const std::vector<std::vector<std::string>>& rows);
 
-  const std::vector<Claim>& claims() const { return claims_; }
+  /// What another page has goes on here.
+  void append(const Page& other);
+
+  std::vector<Claim> claims() const;
   std::string html(const std::string& title, const std::string& lead) const;
 
  private:
-  std::string body_;
-  std::vector<Claim> claims_;
-  std::vector<int> section_of_claim_;
-  int sections_ = 0;
+  struct Section {
+    std::string title, body;
+    std::vector<Claim> claims;
+  };
+  Section& last() { return sections_.back(); }
+
+  std::vector<Section> sections_ = {{}};  // the first is what stands before any title
 };
 
 }  // namespace ves
