@@ -3,6 +3,7 @@
 // Servo valve, cylinder and Temposonics transducer of one leg (report, section 2.4).
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 
 namespace ves::plant {
@@ -26,6 +27,7 @@ class Actuator {
     const double v_end = (current > 0.0 ? model_.gain_extend : model_.gain_retract) * current;
     L_ += v_end * dt + (v_ - v_end) * model_.tau * (1.0 - decay);
     v_ = v_end + (v_ - v_end) * decay;
+    if (std::abs(v_) < kRest) v_ = 0.0;  // a closed valve's decay ends in slow denormal numbers
     a_ = (v_end - v_) / model_.tau;
     if (L_ <= model_.length_min || L_ >= model_.length_max) {
       L_ = L_ <= model_.length_min ? model_.length_min : model_.length_max;
@@ -38,6 +40,7 @@ class Actuator {
   double acceleration() const noexcept { return a_; }  // [m/s^2]
 
  private:
+  static constexpr double kRest = 1e-100;  // [m/s]
   ActuatorModel model_;
   double L_;        // [m]
   double v_ = 0.0;  // [m/s]
