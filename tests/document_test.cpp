@@ -95,6 +95,10 @@ TEST_F(Files, ABlockMayReplaceAnInheritedOne) {
   };
   EXPECT_EQ(keys("base: {modes: 3}\n"), (std::vector<std::string>{"mass", "damping", "modes"}));
   EXPECT_EQ(keys("base: !replace {modes: 3}\n"), std::vector<std::string>{"modes"});
+  put("other.yaml", "stiffness: 1\n");
+  const std::vector<std::string> other = {"stiffness", "modes"};
+  EXPECT_EQ(keys("base: {from: other.yaml, modes: 3}\n"), other);
+  EXPECT_EQ(keys("base: !replace {from: other.yaml, modes: 3}\n"), other);
 }
 
 const char* const kBrick =

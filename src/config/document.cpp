@@ -187,6 +187,7 @@ void resolve(Value& value, const std::filesystem::path& directory, int depth) {
     value.children.erase(value.children.begin() + i);
     base.line = value.line;
     base.file = value.file;
+    value.whole = false;  // over the file that it names, not over nothing
     merge(base, std::move(value));
     value = std::move(base);
     value.whole = true;
