@@ -306,7 +306,7 @@ TEST_F(ClosedLoop, WrenchOfASineIsLateByHoldServoAndFilters) {
   EXPECT_NEAR(std::arg(due / force) / w, expected, 1.5e-3);
   const RobotModel all = carried(e.plant.payload);
   double mass = all.base.mass;
-  for (int i = 0; i < all.joints; ++i) mass += all.link(i).body.mass;
+  for (int i = 0; i < all.size; ++i) mass += all.link(i).body.mass;
   EXPECT_NEAR(std::abs(force / due), mass * w * w * std::abs(servo * filter * sensor),
               0.005 * mass * w * w);
 }

@@ -33,7 +33,7 @@ Link joint(JointType type, const Vec3& axis, const Vec3& at) {
 RobotModel chain(std::initializer_list<Link> links) {
   RobotModel robot;
   robot.base = {5.0, Vec3(0.0, 0.01, 0.2), Mat3::Identity()};
-  for (const Link& link : links) robot.links[static_cast<std::size_t>(robot.joints++)] = link;
+  for (const Link& link : links) robot.extend(link);
   return robot;
 }
 

@@ -83,7 +83,7 @@ TEST(PosePlan, ItsScenarioMovesNoJointFasterThanAsked) {
   ASSERT_GT(planned.plant.robot_events.size(), 100u);
   for (const plant::RobotEvent& event : planned.plant.robot_events) {
     const int i = event.move.joint;
-    const bool turns = e.controller.payload.robot.link(i).type == JointType::kRevolute;
+    const bool turns = e.controller.payload.robot.jointLink(i).type == JointType::kRevolute;
     fastest = std::max(fastest, std::abs(event.move.target - at(i)) / event.move.duration /
                                     (turns ? kDegree : 0.01));
     at(i) = event.move.target;
@@ -127,8 +127,8 @@ TEST(PosePlan, IsBetterThanChanceAndInsideTheLimits) {
     ASSERT_EQ(a.q.size(), 3u);
     for (const JointVector& q : a.q)
       for (int i = 0; i < setup.robot.joints; ++i) {
-        EXPECT_GE(q(i), setup.robot.link(i).lower);
-        EXPECT_LE(q(i), setup.robot.link(i).upper);
+        EXPECT_GE(q(i), setup.robot.jointLink(i).lower);
+        EXPECT_LE(q(i), setup.robot.jointLink(i).upper);
       }
   }
 }

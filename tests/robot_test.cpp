@@ -30,21 +30,21 @@ JointState jointSwing(int joints, double t) {
 /// A revolute-prismatic-revolute arm with skew axes, for what no table robot has.
 RobotModel skewRobot() {
   RobotModel robot;
-  robot.joints = 3;
   robot.base = {3.0, {0.1, -0.05, 0.2}, Vec3(0.1, 0.2, 0.15).asDiagonal()};
   for (int i = 0; i < 3; ++i) {
-    Link& link = robot.links[static_cast<std::size_t>(i)];
+    Link link;
     link.type = i == 1 ? JointType::kPrismatic : JointType::kRevolute;
     link.X_parent = {rotation({0.3 * i, -0.4, 0.2 + i}), {0.2, 0.1 * i, 0.3}};
     link.axis = Vec3(0.2, -0.5 * i, 1.0).normalized();
     link.body = {2.0 + i, {0.05, 0.1, -0.2 * i}, Vec3(0.05, 0.06, 0.07).asDiagonal()};
+    robot.extend(link);
   }
   return robot;
 }
 
 double totalMass(const RobotModel& robot) {
   double mass = robot.base.mass;
-  for (int i = 0; i < robot.joints; ++i) mass += robot.link(i).body.mass;
+  for (int i = 0; i < robot.size; ++i) mass += robot.link(i).body.mass;
   return mass;
 }
 

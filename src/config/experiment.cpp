@@ -109,6 +109,7 @@ Experiment build(const Value& document) {
     p.initial_joints = robot.q;
     out.joint_names = urdf.joint_names;
     out.notes = urdf.warnings;
+    if (!urdf.choice.empty()) out.warnings.push_back(urdf.choice);
   }
 
   p.geometry = c.geometry;
@@ -151,9 +152,9 @@ Experiment build(const Value& document) {
       section.fail("kinematics", fmt::format("{} is of another robot, mount or sensor, want {}; "
                                              "identify again",
                                              masses.kinematics, kinematicsOf(c.payload)));
-    if (std::ssize(masses.bodies) != c.payload.robot.joints + 1)
+    if (std::ssize(masses.bodies) != c.payload.robot.size + 1)
       section.fail("bodies", fmt::format("are {}, want {}: link 0 and a link for each joint",
-                                         masses.bodies.size(), c.payload.robot.joints + 1));
+                                         masses.bodies.size(), c.payload.robot.size + 1));
     c.payload = withMasses(c.payload, masses);
   }
 

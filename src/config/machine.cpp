@@ -84,7 +84,7 @@ void readPlantMismatch(Section s, plant::PlantConfig& p) {
     body.p_BoBcm_B *= center;
   };
   change(p.payload.robot.base);
-  for (int i = 0; i < p.payload.robot.joints; ++i)
+  for (int i = 0; i < p.payload.robot.size; ++i)
     change(p.payload.robot.links[static_cast<std::size_t>(i)].body);
   s.finish();
 }

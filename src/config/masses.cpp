@@ -48,11 +48,14 @@ std::string kinematicsOf(const Payload& payload) {
   };
   frame(payload.X_PS);
   frame(payload.X_PL0());
-  for (int i = 0; i < payload.robot.joints; ++i) {
+  for (int i = 0; i < payload.robot.size; ++i) {
     const Link& link = payload.robot.link(i);
     text += link.type == JointType::kRevolute ? "r " : "p ";
     frame(link.X_parent);
     add(link.axis);
+    if (link.parent != i - 1 || link.joint != i)  // no serial arm
+      text += fmt::format("on {} by {} {:.9g} {:.9g} ", link.parent, link.joint, link.ratio,
+                          link.offset);
   }
   return fingerprint(text);
 }

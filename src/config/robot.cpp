@@ -2,6 +2,9 @@
 #include "readers.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
 
 namespace ves {
 
@@ -9,7 +12,7 @@ double jointUnit(const Link& link) { return link.type == JointType::kRevolute ? 
 
 void requireInLimits(const Section& s, std::string_view key, const UrdfRobot& robot, int joint,
                      double q) {
-  const Link& link = robot.model.link(joint);
+  const Link& link = robot.model.jointLink(joint);
   if (!(q >= link.lower - 1e-9 && q <= link.upper + 1e-9))
     s.fail(key, fmt::format("joint '{}' at {:.6g}, want [{:.6g}, {:.6g}] {}",
                             robot.joint_names[static_cast<std::size_t>(joint)], q / jointUnit(link),
@@ -17,23 +20,87 @@ void requireInLimits(const Section& s, std::string_view key, const UrdfRobot& ro
                             link.type == JointType::kRevolute ? "deg" : "m"));
 }
 
+UrdfRobot chosenRobot(Section& s, const UrdfTree& tree) {
+  const auto own = [&](std::string_view key, const std::string& name) -> const UrdfTree::Joint& {
+    const UrdfTree::Joint* joint = tree.find(name);
+    if (!joint) {
+      std::string all;
+      for (const UrdfTree::Joint& one : tree.joints())
+        if (one.follows.empty()) all += (all.empty() ? "" : ", ") + one.name;
+      s.fail(key, fmt::format("no joint '{}' that moves, want of {}", name, all));
+    }
+    if (!joint->follows.empty())
+      s.fail(key, fmt::format("joint '{}' follows '{}', want that one", name, joint->follows));
+    return *joint;
+  };
+  std::set<std::string> moving;
+  if (s.has("tip") && s.has("joints")) s.fail("joints", "and tip both say it, want one of them");
+  if (s.has("joints")) {
+    for (const std::string& name : s.texts("joints"))
+      if (!moving.insert(own("joints", name).name).second)
+        s.fail("joints", fmt::format("'{}' is given twice", name));
+  } else if (s.has("tip")) {
+    const std::string tip = s.text("tip");
+    if (!tree.hasLink(tip)) s.fail("tip", fmt::format("the robot has no link '{}'", tip));
+    moving = tree.jointsTo(tip);
+  } else {
+    for (const UrdfTree::Joint& joint : tree.joints())
+      if (joint.follows.empty()) moving.insert(joint.name);
+  }
+  std::map<std::string, double> held;
+  if (s.has("lock")) {
+    Section lock = s.section("lock");
+    for (const std::string& name : lock.keys()) {
+      const UrdfTree::Joint& joint = own("lock", name);
+      if (s.has("joints") && moving.count(name))
+        lock.fail(name, "joints lets it move, want one of the two");
+      moving.erase(name);
+      held[name] =
+          lock.number(name, joint.lower / joint.unit(), joint.upper / joint.unit()) * joint.unit();
+    }
+    lock.finish();
+  }
+  if (std::ssize(moving) > kMaxJoints)
+    s.fail("urdf",
+           fmt::format("{} joints move, at most {} may: say which with tip: LINK or joints: "
+                       "[..], or hold some with lock: {{joint: value}}",
+                       moving.size(), kMaxJoints));
+  UrdfRobot out = tree.robot(moving, held);
+  const bool chosen = s.has("tip") || s.has("joints") || s.has("lock");
+  bool serial = true;
+  for (int i = 0; i < out.model.size; ++i)
+    serial = serial && out.model.link(i).parent == i - 1 && out.model.link(i).joint == i;
+  if (!chosen && !serial)
+    out.choice =
+        fmt::format("all {} joints of the robot move: {} (tip, joints or lock would choose)",
+                    out.model.joints, fmt::join(out.joint_names, ", "));
+  return out;
+}
+
 Robot readRobot(Section s, const Value& document) {
   Robot robot;
   const Value* text = document.find("robot")->find("urdf_text");
   if (!text) s.fail("urdf", "missing, want the robot's URDF file");
-  robot.urdf = loadUrdf(s.text("urdf_text"), *text->file);
+  const UrdfTree tree(s.text("urdf_text"), *text->file);
+  robot.urdf = chosenRobot(s, tree);
   robot.X_PR = {Mat3::Identity(), s.vector("adapter_position_m", 3, -10.0, 10.0)};
   robot.adapter_R = readBox(s.section("adapter"));
   robot.X_RL0 = {rotation(s.vector("mount_rpy_deg", 3, -360.0, 360.0) * kDegree),
                  s.vector("mount_m", 3, -10.0, 10.0)};
-  Eigen::VectorXd q(robot.urdf.model.joints);
-  if (q.size() > 0)
-    q = s.vector("joints_deg_or_m", robot.urdf.model.joints, -1e6, 1e6);
-  else if (s.has("joints_deg_or_m") && !s.texts("joints_deg_or_m").empty())
+  const int joints = robot.urdf.model.joints;
+  if (!s.has("joints_deg_or_m")) {
+    for (int i = 0; i < joints; ++i) {
+      const Link& link = robot.urdf.model.jointLink(i);
+      robot.q(i) = std::clamp(0.0, link.lower, link.upper);
+    }
+  } else if (joints > 0) {
+    const Eigen::VectorXd q = s.vector("joints_deg_or_m", joints, -1e6, 1e6);
+    for (int i = 0; i < joints; ++i) {
+      robot.q(i) = q(i) * jointUnit(robot.urdf.model.jointLink(i));
+      requireInLimits(s, "joints_deg_or_m", robot.urdf, i, robot.q(i));
+    }
+  } else if (!s.texts("joints_deg_or_m").empty()) {
     s.fail("joints_deg_or_m", "the robot has no joint that moves, want none");
-  for (int i = 0; i < robot.urdf.model.joints; ++i) {
-    robot.q(i) = q(i) * jointUnit(robot.urdf.model.link(i));
-    requireInLimits(s, "joints_deg_or_m", robot.urdf, i, robot.q(i));
   }
   s.finish();
   return robot;

@@ -9,7 +9,6 @@
 #include <cmath>
 #include <mutex>
 
-#include "ves/config/document.hpp"
 #include "ves/math/dense.hpp"
 
 namespace ves {
@@ -44,41 +43,103 @@ constexpr int kMaxElementDepth = 64;       // [-]
 constexpr double kMaxLength = 1e3;         // [m]
 constexpr double kMaxMass = 1e6;           // [kg]
 constexpr double kMaxInertia = 1e9;        // [kg m^2]
+constexpr double kNoInertia = 1e-6;        // [kg m^2] whose sign does not matter
+constexpr double kMaxRatio = 1e3;          // [-] of a joint that follows
 
-class Loader {
+}  // namespace
+
+class UrdfTree::Impl {
  public:
-  Loader(const std::string& text, const std::string& file) : text_(text), file_(file) {}
-
-  UrdfRobot load() {
-    const urdf::ModelInterfaceSharedPtr urdf = parse();
-    const urdf::Link* link = urdf->getRoot().get();
-    addBody(*link, Transform{});
-    Transform X_body_link;  // of a fixed link in the body that carries it
-    while (!link->child_joints.empty()) {
-      if (link->child_joints.size() > 1)
-        refuse("link", link->name,
-               fmt::format("carries {} joints, want a serial arm without branches",
-                           link->child_joints.size()));
-      const urdf::Joint& joint = *link->child_joints.front();
-      const Transform X_body_joint =
-          X_body_link * toTransform(joint.parent_to_joint_origin_transform);
-      if (!(X_body_joint.p.cwiseAbs().maxCoeff() <= kMaxLength) || !X_body_joint.p.allFinite() ||
-          !X_body_joint.R.allFinite())
-        refuse("joint", joint.name,
-               fmt::format("its origin, want numbers within {} m", kMaxLength));
-      link = urdf->getLink(joint.child_link_name).get();
-      if (joint.type == urdf::Joint::FIXED) {
-        X_body_link = X_body_joint;
-      } else {
-        addJoint(joint, X_body_joint);
-        X_body_link = {};
-      }
-      addBody(*link, X_body_link);
+  Impl(const std::string& text, const std::string& file) : text_(text), file_(file) {
+    urdf_ = parse();
+    const std::map<std::string, std::size_t> places = placesOfJoints();
+    const auto place = [&](const urdf::JointSharedPtr& joint) {
+      const auto at = places.find(joint->name);
+      return at == places.end() ? 0 : at->second;
+    };
+    // Depth first, a link's joints as they stand in the file.
+    std::vector<const urdf::Link*> open = {urdf_->getRoot().get()};
+    while (!open.empty()) {
+      const urdf::Link& link = *open.back();
+      open.pop_back();
+      links_.push_back(&link);
+      if (link.parent_joint) addJoint(*link.parent_joint);
+      std::vector<urdf::JointSharedPtr> below = link.child_joints;
+      std::sort(below.begin(), below.end(),
+                [&](const auto& x, const auto& y) { return place(x) > place(y); });
+      for (const urdf::JointSharedPtr& joint : below)
+        open.push_back(urdf_->getLink(joint->child_link_name).get());
     }
-    return std::move(robot_);
+    for (Joint& joint : joints_) resolve(joint);
+  }
+
+  const std::vector<Joint>& joints() const { return joints_; }
+
+  const Joint* find(const std::string& name) const {
+    const auto at = index_.find(name);
+    return at == index_.end() ? nullptr : &joints_[at->second];
+  }
+
+  const urdf::Link* link(const std::string& name) const { return urdf_->getLink(name).get(); }
+
+  UrdfRobot robot(const std::set<std::string>& moving,
+                  const std::map<std::string, double>& held) const {
+    UrdfRobot out;
+    RobotModel& model = out.model;
+    struct Carried {
+      int link = -1;  // of the model
+      Transform X;    // in it
+    };
+    std::map<const urdf::Link*, Carried> carried;
+    std::map<const urdf::Link*, int> frames;  // index of its own
+    for (const Joint& joint : joints_)
+      if (joint.follows.empty() && moving.count(joint.name)) out.joint_names.push_back(joint.name);
+    for (const urdf::Link* link : links_) {
+      Carried here;
+      bool moves = false;
+      if (link->parent_joint) {
+        const urdf::Joint& joint = *link->parent_joint;
+        here = carried.at(link->getParent().get());
+        here.X = here.X * originOf(joint);
+        if (const Joint* own = find(joint.name)) {
+          const std::string& master = own->follows.empty() ? own->name : own->follows;
+          Link next = linkOf(joint, *own);
+          if (moving.count(master)) {
+            next.parent = here.link;
+            next.X_parent = here.X;
+            here = {addTo(out, next, *own), {}};
+            moves = true;
+          } else {
+            const double q = heldAt(*own, held);
+            here.X = here.X * linkPose(next, q);
+            out.held.push_back(fmt::format("joint '{}' at {:.6g} {}", own->name, q / own->unit(),
+                                           own->type == JointType::kRevolute ? "deg" : "m"));
+          }
+        }
+      }
+      const auto parent = link->parent_joint ? frames.at(link->getParent().get()) : -1;
+      frames[link] = static_cast<int>(out.frames.size());
+      out.frames.push_back(
+          {link->name, parent, here.link, here.X, moves ? link->parent_joint->name : ""});
+      carried[link] = here;
+      RigidBody& carrier =
+          here.link < 0 ? model.base : model.links[static_cast<std::size_t>(here.link)].body;
+      if (!link->inertial) {
+        if (moves)
+          out.warnings.push_back(fmt::format("{}:{}: link '{}' moves and has no mass", file_,
+                                             lineOf("link", link->name), link->name));
+        continue;
+      }
+      carrier = combine(carrier, here.X, bodyOf(*link, out.warnings));
+    }
+    return out;
   }
 
  private:
+  static Transform originOf(const urdf::Joint& joint) {
+    return toTransform(joint.parent_to_joint_origin_transform);
+  }
+
   /// What makes the XML parser slow or lets it run out of stack.
   void requireReasonable() const {
     int depth = 0;
@@ -113,14 +174,17 @@ class Loader {
     throw InputError(fmt::format("{}:{}: not a usable URDF: {}", file_, lineOfQuoted(what), what));
   }
 
-  void addJoint(const urdf::Joint& joint, const Transform& X_parent) {
-    if (robot_.model.joints == kMaxJoints)
-      refuse("joint", joint.name, fmt::format("one too many, at most {} may move", kMaxJoints));
-    Link link;
+  void addJoint(const urdf::Joint& joint) {
+    const Transform X = originOf(joint);
+    if (!(X.p.cwiseAbs().maxCoeff() <= kMaxLength) || !X.p.allFinite() || !X.R.allFinite())
+      refuse("joint", joint.name, fmt::format("its origin, want numbers within {} m", kMaxLength));
+    if (joint.type == urdf::Joint::FIXED) return;
+    Joint own;
+    own.name = joint.name;
     switch (joint.type) {
       case urdf::Joint::REVOLUTE:
-      case urdf::Joint::CONTINUOUS: link.type = JointType::kRevolute; break;
-      case urdf::Joint::PRISMATIC: link.type = JointType::kPrismatic; break;
+      case urdf::Joint::CONTINUOUS: own.type = JointType::kRevolute; break;
+      case urdf::Joint::PRISMATIC: own.type = JointType::kPrismatic; break;
       default:
         refuse("joint", joint.name,
                "its type is not supported, want revolute, continuous, prismatic or fixed");
@@ -128,28 +192,81 @@ class Loader {
     const Vec3 axis(joint.axis.x, joint.axis.y, joint.axis.z);
     if (!(axis.norm() > 1e-6) || !axis.allFinite())
       refuse("joint", joint.name, "its axis has no direction");
-    link.axis = axis.normalized();
-    link.X_parent = X_parent;
-    link.lower = -HUGE_VAL;
-    link.upper = HUGE_VAL;
+    own.lower = -HUGE_VAL;
+    own.upper = HUGE_VAL;
     if (joint.limits && joint.type != urdf::Joint::CONTINUOUS) {
-      link.lower = joint.limits->lower;
-      link.upper = joint.limits->upper;
-      if (!(link.lower <= link.upper))
+      own.lower = joint.limits->lower;
+      own.upper = joint.limits->upper;
+      if (!(own.lower <= own.upper))
         refuse("joint", joint.name,
-               fmt::format("limits [{}, {}], want lower <= upper", link.lower, link.upper));
+               fmt::format("limits [{}, {}], want lower <= upper", own.lower, own.upper));
     }
-    robot_.model.links[static_cast<std::size_t>(robot_.model.joints++)] = link;
-    robot_.joint_names.push_back(joint.name);
+    if (joint.mimic) {
+      own.follows = joint.mimic->joint_name;
+      own.ratio = joint.mimic->multiplier;
+      own.offset = joint.mimic->offset;
+      if (!std::isfinite(own.ratio) || !(std::abs(own.ratio) <= kMaxRatio) ||
+          !std::isfinite(own.offset) || !(std::abs(own.offset) <= kMaxLength))
+        refuse("joint", joint.name,
+               fmt::format("follows by {} and {}, want numbers within {} and {}", own.ratio,
+                           own.offset, kMaxRatio, kMaxLength));
+    }
+    index_[own.name] = joints_.size();
+    joints_.push_back(own);
   }
 
-  /// Adds a link's body to the last moving link (or the base).
-  void addBody(const urdf::Link& link, const Transform& X_body_link) {
-    const bool fixed = !link.parent_joint || link.parent_joint->type == urdf::Joint::FIXED;
-    if (!link.inertial) {
-      if (fixed) return;
-      refuse("link", link.name, "has no inertial element, and its joint moves");
+  /// Whom a joint follows at the end, when it follows one that follows.
+  void resolve(Joint& joint) const {
+    for (std::size_t steps = 0; !joint.follows.empty(); ++steps) {
+      const Joint* master = find(joint.follows);
+      if (!master)
+        refuse("joint", joint.name,
+               fmt::format("follows '{}', which is no joint that moves", joint.follows));
+      if (steps > joints_.size()) refuse("joint", joint.name, "follows itself");
+      if (master->follows.empty()) return;
+      joint.follows = master->follows;
+      joint.offset += joint.ratio * master->offset;
+      joint.ratio *= master->ratio;
     }
+  }
+
+  Link linkOf(const urdf::Joint& joint, const Joint& own) const {
+    Link link;
+    link.type = own.type;
+    link.axis = Vec3(joint.axis.x, joint.axis.y, joint.axis.z).normalized();
+    link.lower = own.lower;
+    link.upper = own.upper;
+    link.ratio = own.ratio;
+    link.offset = own.offset;
+    return link;
+  }
+
+  /// Returns its index.
+  int addTo(UrdfRobot& out, Link link, const Joint& own) const {
+    RobotModel& model = out.model;
+    if (model.size == kMaxLinks)
+      refuse("joint", own.name, fmt::format("one too many, at most {} may move", kMaxLinks));
+    const bool follows = !own.follows.empty();
+    if (!follows && model.joints == kMaxJoints)
+      refuse("joint", own.name, fmt::format("one too many, at most {} may move", kMaxJoints));
+    if (follows)
+      link.joint =
+          static_cast<int>(std::find(out.joint_names.begin(), out.joint_names.end(), own.follows) -
+                           out.joint_names.begin());
+    if (link.joint >= kMaxJoints)
+      refuse("joint", own.name, fmt::format("one too many, at most {} may move", kMaxJoints));
+    model.add(link, follows);
+    return model.size - 1;
+  }
+
+  double heldAt(const Joint& joint, const std::map<std::string, double>& held) const {
+    if (!joint.follows.empty())
+      return joint.ratio * heldAt(*find(joint.follows), held) + joint.offset;
+    const auto given = held.find(joint.name);
+    return given != held.end() ? given->second : std::clamp(0.0, joint.lower, joint.upper);
+  }
+
+  RigidBody bodyOf(const urdf::Link& link, std::vector<std::string>& warnings) const {
     const urdf::Inertial& in = *link.inertial;
     const Transform X_link_com = toTransform(in.origin);
     RigidBody body;
@@ -168,20 +285,16 @@ class Loader {
       refuse("link", link.name,
              fmt::format("its inertia, want numbers within {} kg m^2", kMaxInertia));
     const Vec3 principal = symmetricEigenvalues(I);
-    if (principal(0) < -1e-12 * std::abs(principal(2)))
+    if (principal(0) < -std::max(kNoInertia, 1e-12 * principal(2)))
       refuse("link", link.name,
              fmt::format("principal moment of inertia {}, want at least 0", principal(0)));
     if (principal(2) > (principal(0) + principal(1)) * (1.0 + 1e-9))
-      robot_.warnings.push_back(fmt::format(
+      warnings.push_back(fmt::format(
           "{}:{}: link '{}': principal moments {:.4g}, {:.4g}, {:.4g} kg m^2: no rigid body has "
           "one "
           "larger than the sum of the others; used as given",
           file_, lineOf("link", link.name), link.name, principal(0), principal(1), principal(2)));
-    RobotModel& model = robot_.model;
-    RigidBody& carrier = model.joints == 0
-                             ? model.base
-                             : model.links[static_cast<std::size_t>(model.joints - 1)].body;
-    carrier = combine(carrier, X_body_link, body);
+    return body;
   }
 
   [[noreturn]] void refuse(const char* element, const std::string& name,
@@ -192,10 +305,24 @@ class Loader {
 
   /// Line of <element name="name">; urdfdom keeps no positions.
   int lineOf(const std::string& element, const std::string& name) const {
+    return lineAt(offsetOf(element, name));
+  }
+  std::map<std::string, std::size_t> placesOfJoints() const {
+    std::map<std::string, std::size_t> out;
+    for (std::size_t at = 0; (at = text_.find("<joint", at)) != std::string::npos; ++at) {
+      const std::string element = text_.substr(at, text_.find('>', at) - at);
+      const std::size_t begin = element.find("name=");
+      if (begin == std::string::npos || begin + 6 > element.size()) continue;
+      const std::size_t end = element.find(element[begin + 5], begin + 6);
+      if (end != std::string::npos) out.emplace(element.substr(begin + 6, end - begin - 6), at);
+    }
+    return out;
+  }
+  std::size_t offsetOf(const std::string& element, const std::string& name) const {
     for (std::size_t at = 0; (at = text_.find("<" + element, at)) != std::string::npos; ++at)
       if (text_.substr(at, text_.find('>', at) - at).find("\"" + name + "\"") != std::string::npos)
-        return lineAt(at);
-    return 1;
+        return at;
+    return 0;
   }
 
   /// Line of the first name that a message puts between brackets or quotes.
@@ -215,15 +342,43 @@ class Loader {
                    text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(offset), '\n'));
   }
 
-  const std::string& text_;
-  const std::string& file_;
-  UrdfRobot robot_;
+  const std::string text_, file_;
+  urdf::ModelInterfaceSharedPtr urdf_;
+  std::vector<const urdf::Link*> links_;  // each behind those that carry it
+  std::vector<Joint> joints_;
+  std::map<std::string, std::size_t> index_;  // of joints_
 };
 
-}  // namespace
+double UrdfTree::Joint::unit() const { return type == JointType::kRevolute ? kDegree : 1.0; }
+
+UrdfTree::UrdfTree(const std::string& text, const std::string& file)
+    : impl_(std::make_unique<Impl>(text, file)) {}
+UrdfTree::~UrdfTree() = default;
+
+const std::vector<UrdfTree::Joint>& UrdfTree::joints() const { return impl_->joints(); }
+
+const UrdfTree::Joint* UrdfTree::find(const std::string& joint) const { return impl_->find(joint); }
+
+bool UrdfTree::hasLink(const std::string& link) const { return impl_->link(link) != nullptr; }
+
+std::set<std::string> UrdfTree::jointsTo(const std::string& link) const {
+  std::set<std::string> out;
+  for (const urdf::Link* at = impl_->link(link); at && at->parent_joint; at = at->getParent().get())
+    if (const Joint* joint = find(at->parent_joint->name))
+      out.insert(joint->follows.empty() ? joint->name : joint->follows);
+  return out;
+}
+
+UrdfRobot UrdfTree::robot(const std::set<std::string>& moving,
+                          const std::map<std::string, double>& held) const {
+  return impl_->robot(moving, held);
+}
 
 UrdfRobot loadUrdf(const std::string& text, const std::string& file) {
-  return Loader(text, file).load();
+  const UrdfTree tree(text, file);
+  std::set<std::string> all;
+  for (const UrdfTree::Joint& joint : tree.joints()) all.insert(joint.name);
+  return tree.robot(all);
 }
 
 }  // namespace ves

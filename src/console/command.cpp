@@ -117,7 +117,7 @@ RobotMove robotMove(Words& words, const Experiment& experiment) {
                          : fmt::format("'{}', want one of {}", joint, fmt::join(names, ", ")));
   RobotMove move;
   move.joint = static_cast<int>(at - names.begin());
-  const Link& link = experiment.controller.payload.robot.link(move.joint);
+  const Link& link = experiment.controller.payload.robot.jointLink(move.joint);
   const bool turns = link.type == JointType::kRevolute;
   const double unit = turns ? kDegree : kMillimetre;
   move.target =

@@ -9,12 +9,11 @@ Wrench staticWrench(const Payload& payload, const JointVector& q, const Mat3& R_
   const RobotModel& robot = payload.robot;
   double mass = robot.base.mass;
   Vec3 moment = robot.base.mass * robot.base.p_BoBcm_B;  // [kg m] about L0o in L0
-  Transform X_L0Li;
-  for (int i = 0; i < robot.joints; ++i) {
-    const Link& link = robot.link(i);
-    X_L0Li = X_L0Li * linkPose(link, q(i));
-    mass += link.body.mass;
-    moment += link.body.mass * (X_L0Li * link.body.p_BoBcm_B);
+  const LinkPoses X_L0L = linkPoses(robot, q);
+  for (int i = 0; i < robot.size; ++i) {
+    const RigidBody& body = robot.link(i).body;
+    mass += body.mass;
+    moment += body.mass * (X_L0L[i] * body.p_BoBcm_B);
   }
   const Transform X_PL0 = payload.X_PL0();
   const Vec3 g_P = R_IP.transpose() * g_I;

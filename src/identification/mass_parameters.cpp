@@ -87,8 +87,8 @@ std::string nameOf(VectorXd coefficients) {
 }  // namespace
 
 VectorXd massParameters(const RobotModel& robot) {
-  VectorXd out(4 * (robot.joints + 1));
-  for (int i = 0; i <= robot.joints; ++i) {
+  VectorXd out(4 * (robot.size + 1));
+  for (int i = 0; i <= robot.size; ++i) {
     const RigidBody& body = i == 0 ? robot.base : robot.link(i - 1).body;
     out.segment<4>(4 * i) << body.mass, body.mass * body.p_BoBcm_B;
   }
@@ -97,10 +97,10 @@ VectorXd massParameters(const RobotModel& robot) {
 
 MatrixXd staticRegressor(const RobotModel& robot, const Transform& X_BL0, const JointVector& q,
                          const Vec3& g_B) {
-  MatrixXd Y = MatrixXd::Zero(6, 4 * (robot.joints + 1));
-  Transform X_BLi = X_BL0;
-  for (int i = 0; i <= robot.joints; ++i) {
-    if (i > 0) X_BLi = X_BLi * linkPose(robot.link(i - 1), q(i - 1));
+  MatrixXd Y = MatrixXd::Zero(6, 4 * (robot.size + 1));
+  const LinkPoses X_L0L = linkPoses(robot, q);
+  for (int i = 0; i <= robot.size; ++i) {
+    const Transform X_BLi = i > 0 ? X_BL0 * X_L0L[i - 1] : X_BL0;
     Y.block<3, 1>(0, 4 * i) = g_B;
     Y.block<3, 1>(3, 4 * i) = X_BLi.p.cross(g_B);
     Y.block<3, 3>(3, 4 * i + 1) = -skew(g_B) * X_BLi.R;
@@ -111,14 +111,14 @@ MatrixXd staticRegressor(const RobotModel& robot, const Transform& X_BL0, const 
 SeparableCombinations separableCombinations(const RobotModel& robot) {
   constexpr int kPoses = 80;
   constexpr double kTolerance = 1e-8;  // [-] of lengths that are one
-  const Index all = 4 * (robot.joints + 1);
+  const Index all = 4 * (robot.size + 1);
   std::mt19937_64 draw(1);
   std::uniform_real_distribution<double> angle(-1.0, 1.0);
   MatrixXd Y(6 * kPoses, all);
   for (int k = 0; k < kPoses; ++k) {
     JointVector q = JointVector::Zero();
     for (int i = 0; i < robot.joints; ++i)
-      q(i) = (robot.link(i).type == JointType::kRevolute ? M_PI : 1.0) * angle(draw);
+      q(i) = (robot.jointLink(i).type == JointType::kRevolute ? M_PI : 1.0) * angle(draw);
     const Vec3 g = rotation(Vec3(angle(draw), angle(draw), 0.0)).transpose() * Vec3(0, 0, -1);
     Y.middleRows(6 * k, 6) = staticRegressor(robot, {}, q, g);
   }

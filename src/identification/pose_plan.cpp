@@ -93,7 +93,7 @@ class Planner {
   JointVector pose() {
     JointVector q = JointVector::Zero();
     for (int k = 0; k < setup_.robot.joints; ++k) {
-      const Link& link = setup_.robot.link(k);
+      const Link& link = setup_.robot.jointLink(k);
       const double most = link.type == JointType::kRevolute ? M_PI : 1.0;
       // Of a long range, what lies about its middle; of one without end, about zero.
       const bool ends = std::isfinite(link.lower) && std::isfinite(link.upper);

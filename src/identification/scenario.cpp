@@ -36,7 +36,7 @@ std::string scenarioOf(const PosePlan& plan, const Experiment& experiment, const
   const auto moves = [&](const JointVector& to, double start, double time) {
     std::string text;
     for (int i = 0; i < robot.joints; ++i) {
-      const double unit = robot.link(i).type == JointType::kRevolute ? kDegree : 1.0;
+      const double unit = robot.jointLink(i).type == JointType::kRevolute ? kDegree : 1.0;
       text += fmt::format("{}{{at_s: {:.2f}, duration_s: {:.2f}, joint: {}, to_deg_or_m: {:.6g}}}",
                           text.empty() ? "" : ",\n             ", start, time,
                           experiment.joint_names[static_cast<std::size_t>(i)], to(i) / unit);
@@ -46,7 +46,7 @@ std::string scenarioOf(const PosePlan& plan, const Experiment& experiment, const
   const auto timeTo = [&](const JointVector& to) {
     double time = 1.0;
     for (int i = 0; i < robot.joints; ++i) {
-      const bool turns = robot.link(i).type == JointType::kRevolute;
+      const bool turns = robot.jointLink(i).type == JointType::kRevolute;
       const double one = std::abs(to(i) - at(i)) / (speed * (turns ? kDegree : 0.01));
       time = std::max(time, std::ceil(one * 10.0) / 10.0);
     }

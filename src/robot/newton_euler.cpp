@@ -19,45 +19,62 @@ Wrench inertialWrench(const RigidBody& body, const ProperMotion& B) noexcept {
 
 InverseDynamics newtonEuler(const RobotModel& robot, const JointState& q,
                             const ProperMotion& L0) noexcept {
-  std::array<Transform, kMaxJoints> X;  // link i in its parent
-  std::array<Wrench, kMaxJoints> F;     // inertial wrench of link i, about its origin, its axes
+  // Vectors and matrices of Eigen begin without values: only the links that there are cost time.
+  std::array<Mat3, kMaxLinks> R;               // link in its parent
+  std::array<Vec3, kMaxLinks> p, w, alpha, a;  // pose in its parent, and proper motion
+  std::array<Vec3, kMaxLinks> f, n;            // wrench on the link, about its origin, its axes
 
   // Outward: motion of each link, and the wrench it takes.
-  ProperMotion parent = L0;
-  for (int i = 0; i < robot.joints; ++i) {
+  for (int i = 0; i < robot.size; ++i) {
     const auto k = static_cast<std::size_t>(i);
     const Link& link = robot.links[k];
-    X[k] = linkPose(link, q.q(i));
-    const Mat3 R = X[k].R.transpose();
-    const Vec3& p = X[k].p;
+    const Transform X = linkPose(link, link.at(q.q(link.joint)));
+    R[k] = X.R;
+    p[k] = X.p;
+    const auto c = static_cast<std::size_t>(link.parent);
+    const bool on_base = link.parent < 0;
+    const Vec3 &w_c = on_base ? L0.w : w[c], &alpha_c = on_base ? L0.alpha : alpha[c],
+               &a_c = on_base ? L0.a : a[c];
+    const Mat3 R_T = X.R.transpose();
     ProperMotion m;
-    m.w = R * parent.w;
-    m.alpha = R * parent.alpha;
-    m.a = R * (parent.a + parent.alpha.cross(p) + parent.w.cross(parent.w.cross(p)));
+    m.w = R_T * w_c;
+    m.alpha = R_T * alpha_c;
+    m.a = R_T * (a_c + alpha_c.cross(X.p) + w_c.cross(w_c.cross(X.p)));
+    const double q_dot = link.ratio * q.q_dot(link.joint),
+                 q_ddot = link.ratio * q.q_ddot(link.joint);
     switch (link.type) {
       case JointType::kRevolute:
-        m.alpha += m.w.cross(q.q_dot(i) * link.axis) + q.q_ddot(i) * link.axis;
-        m.w += q.q_dot(i) * link.axis;
+        m.alpha += m.w.cross(q_dot * link.axis) + q_ddot * link.axis;
+        m.w += q_dot * link.axis;
         break;
       case JointType::kPrismatic:
-        m.a += 2.0 * m.w.cross(q.q_dot(i) * link.axis) + q.q_ddot(i) * link.axis;
+        m.a += 2.0 * m.w.cross(q_dot * link.axis) + q_ddot * link.axis;
         break;
     }
-    F[k] = inertialWrench(link.body, m);
-    parent = m;
+    const Wrench takes = inertialWrench(link.body, m);
+    f[k] = takes.f;
+    n[k] = takes.n;
+    w[k] = m.w;
+    alpha[k] = m.alpha;
+    a[k] = m.a;
   }
 
   // Inward: what each link asks of its parent.
   InverseDynamics out;
-  Wrench asked;  // by the links beyond, about this link's origin in its axes
-  for (int i = robot.joints - 1; i >= 0; --i) {
+  out.F_L0o_L0 = inertialWrench(robot.base, L0);
+  for (int i = robot.size - 1; i >= 0; --i) {
     const auto k = static_cast<std::size_t>(i);
     const Link& link = robot.links[k];
-    const Wrench total = F[k] + asked;
-    out.tau(i) = link.axis.dot(link.type == JointType::kRevolute ? total.n : total.f);
-    asked = transfer(X[k], total);
+    out.tau(link.joint) +=
+        link.ratio * link.axis.dot(link.type == JointType::kRevolute ? n[k] : f[k]);
+    const Wrench asked = transfer({R[k], p[k]}, {f[k], n[k]});
+    if (link.parent < 0) {
+      out.F_L0o_L0 = out.F_L0o_L0 + asked;
+    } else {
+      f[static_cast<std::size_t>(link.parent)] += asked.f;
+      n[static_cast<std::size_t>(link.parent)] += asked.n;
+    }
   }
-  out.F_L0o_L0 = inertialWrench(robot.base, L0) + asked;
   return out;
 }
 

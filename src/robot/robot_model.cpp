@@ -29,13 +29,28 @@ Mat6 spatialMass(const RigidBody& body) noexcept {
   return M;
 }
 
-RigidBody compositeBody(const RobotModel& robot, const JointVector& q) noexcept {
-  RigidBody all = robot.base;
-  Transform X_L0Li;
-  for (int i = 0; i < robot.joints; ++i) {
-    X_L0Li = X_L0Li * linkPose(robot.link(i), q(i));
-    all = combine(all, X_L0Li, robot.link(i).body);
+void RobotModel::add(const Link& link, bool follows) {
+  const auto k = static_cast<std::size_t>(size++);
+  links[k] = link;
+  if (follows) return;
+  links[k].joint = joints;
+  own[static_cast<std::size_t>(joints++)] = static_cast<int>(k);
+}
+
+LinkPoses linkPoses(const RobotModel& robot, const JointVector& q) noexcept {
+  LinkPoses X;
+  for (int i = 0; i < robot.size; ++i) {
+    const Link& link = robot.link(i);
+    const Transform own = linkPose(link, link.at(q(link.joint)));
+    X[i] = link.parent < 0 ? own : X[link.parent] * own;
   }
+  return X;
+}
+
+RigidBody compositeBody(const RobotModel& robot, const JointVector& q) noexcept {
+  const LinkPoses X_L0L = linkPoses(robot, q);
+  RigidBody all = robot.base;
+  for (int i = 0; i < robot.size; ++i) all = combine(all, X_L0L[i], robot.link(i).body);
   return all;
 }
 

@@ -12,12 +12,16 @@ namespace ves::test {
 inline Vec6 momentum(const RobotModel& robot, const std::function<Transform(double)>& X_IL0,
                      const std::function<JointVector(double)>& q, double t, double h) {
   const auto poseOf = [&](int body, double s) {
-    Transform X = X_IL0(s);
-    for (int i = 0; i < body; ++i) X = X * linkPose(robot.link(i), q(s)(i));
-    return X;
+    const Transform X = X_IL0(s);
+    Transform X_L0L;
+    for (int i = body - 1; i >= 0; i = robot.link(i).parent) {  // from the tip inwards
+      const Link& link = robot.link(i);
+      X_L0L = linkPose(link, link.ratio * q(s)(link.joint) + link.offset) * X_L0L;
+    }
+    return X * X_L0L;
   };
   Vec6 sum = Vec6::Zero();
-  for (int body = 0; body <= robot.joints; ++body) {
+  for (int body = 0; body <= robot.size; ++body) {
     const RigidBody& b = body == 0 ? robot.base : robot.link(body - 1).body;
     const auto com = [&](double s) { return Vec3(poseOf(body, s) * b.p_BoBcm_B); };
     const auto R = [&](double s) { return poseOf(body, s).R; };

@@ -3,25 +3,83 @@
 // Robots from URDF.
 #pragma once
 
+#include <map>
+#include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
+#include "ves/config/document.hpp"
 #include "ves/robot/robot_model.hpp"
 
 namespace ves {
 
-struct UrdfRobot {
-  RobotModel model;
-  std::vector<std::string> joint_names;  // of the moving joints, base to tip
-  std::vector<std::string> warnings;     // what no rigid body can have, accepted all the same
+/// A frame of the description: a link's, whether it has mass or not.
+struct NamedFrame {
+  std::string name;
+  int parent = -1;    // [-] index of the frame that carries it; -1: the root
+  int link = -1;      // [-] index of the moving link that carries it; -1: link 0
+  Transform X_link;   // its pose in that link's frame
+  std::string joint;  // that moves it against its parent; empty: none
 };
 
-/// A serial arm, revolute (continuous too) and prismatic, from URDF text; links behind fixed joints
-/// are counted into the link that carries them. `file` is for messages only.
+struct UrdfRobot {
+  RobotModel model;
+  std::vector<std::string> joint_names;  // of the joint values
+  std::vector<NamedFrame> frames;        // every link, base first
+  std::vector<std::string> held;         // "joint 'finger' at 0.01 m": could move, and does not
+  std::vector<std::string> warnings;     // what no rigid body can have, accepted all the same
+  std::string choice;  // what moves, where nobody has said it and it is no serial arm
+};
+
+/// A robot description, a tree of links, and the robots that can be made of it.
 ///
-/// Refuses (InputError) what is not a chain, has no inertia, or does not parse; a link without
-/// mass on a fixed joint may lack its inertial element. Inertias that violate the triangle
-/// inequality (the PUMA's link 3, the DOSS's links 3 and 5) only warn.
+/// Refuses (InputError) what does not parse, loops, planar and floating joints, and masses,
+/// inertias and lengths that no robot has. Links without mass are frames; one that moves warns.
+/// Inertias that violate the triangle inequality (the PUMA's link 3, the DOSS's links 3 and 5) warn
+/// too. Meshes are not read.
+class UrdfTree {
+ public:
+  /// A joint that can move.
+  struct Joint {
+    std::string name;
+    JointType type = JointType::kRevolute;
+    double lower = 0.0, upper = 0.0;   // [rad | m]
+    std::string follows;               // the joint whose value moves it (mimic); empty: its own
+    double ratio = 1.0, offset = 0.0;  // [-], [rad | m] stands at ratio * value + offset
+
+    double unit() const;  // [rad/deg | 1]
+  };
+
+  /// `file` is for messages only.
+  UrdfTree(const std::string& text, const std::string& file);
+  ~UrdfTree();
+  UrdfTree(const UrdfTree&) = delete;
+  UrdfTree& operator=(const UrdfTree&) = delete;
+
+  /// In the file's order, each behind those that carry it.
+  const std::vector<Joint>& joints() const;
+  const Joint* find(const std::string& joint) const;
+  bool hasLink(const std::string& link) const;
+  /// The joints that move a link, those that others follow among them.
+  std::set<std::string> jointsTo(const std::string& link) const;
+
+  /// The robot in which the joints `moving` move, and what follows them. The others are held at
+  /// `held` [rad | m]; those it does not name at zero, or at the limit next to it. Links that do
+  /// not move are counted into the one that carries them.
+  UrdfRobot robot(const std::set<std::string>& moving,
+                  const std::map<std::string, double>& held = {}) const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// "tip", "joints" and "lock" of a robot's file: which joints move, and where the others are held.
+/// Without them all move.
+UrdfRobot chosenRobot(Section& s, const UrdfTree& tree);
+
+/// The robot in which all joints move.
 UrdfRobot loadUrdf(const std::string& text, const std::string& file);
 
 }  // namespace ves

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// A serial robot as plain numbers: what gravity compensation and Newton-Euler read.
+// A robot as plain numbers, a tree of links: what gravity compensation and Newton-Euler read.
 #pragma once
 
 #include <array>
@@ -9,7 +9,8 @@
 
 namespace ves {
 
-inline constexpr int kMaxJoints = 12;
+inline constexpr int kMaxJoints = 12;  // [-] that move by themselves
+inline constexpr int kMaxLinks = 24;   // [-] that move: the joints' own, and those that follow
 
 enum class JointType { kRevolute, kPrismatic };
 
@@ -33,22 +34,38 @@ inline RigidBody heavier(double times, const RigidBody& body) noexcept {
 /// A joint and the link it moves. The link's frame is the joint's frame after the joint's motion.
 struct Link {
   JointType type = JointType::kRevolute;
+  int parent = -1;            // [-] index of the link that carries it, below its own; -1: link 0
+  int joint = 0;              // [-] index of the joint value that moves it
+  double ratio = 1.0;         // [-] its joint stands at ratio * value + offset; other than 1 and 0
+  double offset = 0.0;        // [rad | m] where it follows another joint
   Transform X_parent;         // pose of the joint's frame in the parent link, at joint value 0
   Vec3 axis = Vec3::UnitZ();  // [-] unit vector, joint frame
   double lower = 0.0;         // [rad | m] joint range
   double upper = 0.0;         // [rad | m]
   RigidBody body;
 
+  double at(double value) const { return ratio * value + offset; }  // [rad | m] of its joint
   bool operator==(const Link&) const = default;
 };
 
-/// Links 1..n on a fixed base link 0, whose frame is L0.
+/// Links 1..n on a fixed base link 0, whose frame is L0; each stands behind the one that carries
+/// it.
 struct RobotModel {
   RigidBody base;  // link 0
-  int joints = 0;  // [-]
-  std::array<Link, kMaxJoints> links{};
+  int size = 0;    // [-] links that move
+  int joints = 0;  // [-] joint values
+  std::array<Link, kMaxLinks> links{};
+  std::array<int, kMaxJoints> own{};  // [-] index of the link that joint value i moves itself
 
   const Link& link(int i) const { return links[static_cast<std::size_t>(i)]; }
+  const Link& jointLink(int i) const { return link(own[static_cast<std::size_t>(i)]); }
+  /// A further link. It has a joint of its own, or follows the one it names.
+  void add(const Link& link, bool follows = false);
+  /// A further link with a joint of its own on the last one: a serial arm.
+  void extend(Link link) {
+    link.parent = size - 1;
+    add(link);
+  }
   bool operator==(const RobotModel&) const = default;
 };
 
@@ -67,10 +84,21 @@ RigidBody rotated(const Mat3& R_AB, const RigidBody& body_B) noexcept;
 /// [F; N] = spatialMass * [a; alpha] of Bo, for a body that does not turn yet.
 Mat6 spatialMass(const RigidBody& body) noexcept;
 
+/// Of every link that moves, in L0. Entries from RobotModel::size on are not set.
+class LinkPoses {
+ public:
+  Transform& operator[](int i) { return X_[static_cast<std::size_t>(i)]; }
+  const Transform& operator[](int i) const { return X_[static_cast<std::size_t>(i)]; }
+
+ private:
+  std::array<Transform, kMaxLinks> X_;
+};
+LinkPoses linkPoses(const RobotModel& robot, const JointVector& q) noexcept;
+
 /// The whole robot with its joints locked at q, in L0: [M_1] of (3.1).
 RigidBody compositeBody(const RobotModel& robot, const JointVector& q) noexcept;
 
-/// Pose of link i's frame in its parent's, for joint value q.
+/// Pose of a link's frame in its parent's, its joint at q.
 Transform linkPose(const Link& link, double q) noexcept;
 
 }  // namespace ves
