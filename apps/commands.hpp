@@ -13,6 +13,7 @@ int doctorCommand(int argc, char** argv);
 int faultsCommand(int argc, char** argv);
 int identifyCommand(int argc, char** argv);
 int plantCommand(int argc, char** argv);
+int robotCommand(int argc, char** argv);
 int replayCommand(int argc, char** argv);
 int reportCommand(int argc, char** argv);
 int runCommand(int argc, char** argv);

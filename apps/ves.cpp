@@ -31,6 +31,7 @@ constexpr Command kCommands[] = {
     {"sweep", "one scenario over many values, on all cores, one row a run", sweepCommand},
     {"faults", "inject the faults of the table, say what was expected and what happened",
      faultsCommand},
+    {"robot", "what a robot description holds, and what of it moves", robotCommand},
     {"doctor", "can this machine keep the loop's time, and what to do where it cannot",
      doctorCommand},
 };

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// ves robot: what a robot description holds, and what of it moves.
+#include "app.hpp"
+#include "commands.hpp"
+#include "ves/config/urdf.hpp"
+#include "ves/math/dense.hpp"
+
+namespace ves::app {
+namespace {
+
+/// "robot" of a file: a URDF, or a robot's YAML.
+Value robotDocument(const std::string& file, const std::vector<std::string>& sets) {
+  Value document = parseDocument("{}", file);
+  const bool urdf = std::filesystem::path(file).extension() == ".urdf";
+  applyOverride(document, fmt::format("robot.{}={}", urdf ? "urdf" : "from", file));
+  for (const std::string& one : sets) applyOverride(document, "robot." + one);
+  return document;
+}
+
+/// Joint values of the file; zero, or the limit next to it, where it has none.
+JointVector jointsOf(Section& s, const UrdfRobot& robot) {
+  JointVector q = JointVector::Zero();
+  const int n = robot.model.joints;
+  const bool given = n > 0 && s.has("joints_deg_or_m");
+  const Eigen::VectorXd values =
+      given ? s.vector("joints_deg_or_m", n, -1e6, 1e6) : Eigen::VectorXd::Zero(n);
+  for (int i = 0; i < n; ++i) {
+    const Link& link = robot.model.jointLink(i);
+    const double unit = link.type == JointType::kRevolute ? kDegree : 1.0;
+    q(i) = given ? values(i) * unit : std::clamp(0.0, link.lower, link.upper);
+  }
+  return q;
+}
+
+void printJoints(const UrdfRobot& robot, const JointVector& q) {
+  const RobotModel& model = robot.model;
+  for (int i = 0; i < model.joints; ++i) {
+    const Link& link = model.jointLink(i);
+    const bool turns = link.type == JointType::kRevolute;
+    const double unit = turns ? kDegree : 1.0;
+    const std::string range =
+        std::isfinite(link.lower) || std::isfinite(link.upper)
+            ? fmt::format("{:.6g} to {:.6g}", link.lower / unit, link.upper / unit)
+            : "no limits";
+    fmt::print("  {:>2}  {:<32} {:<24} {:<4} at {:.6g}\n", i + 1,
+               robot.joint_names[static_cast<std::size_t>(i)], range, turns ? "deg" : "m",
+               q(i) / unit);
+  }
+  for (const NamedFrame& frame : robot.frames) {
+    if (frame.joint.empty()) continue;
+    const Link& link = model.link(frame.link);
+    const std::string& master = robot.joint_names[static_cast<std::size_t>(link.joint)];
+    if (master != frame.joint)
+      fmt::print("      {:<32} follows {}: {:.6g} of it, {:+.6g}\n", frame.joint, master,
+                 link.ratio, link.offset);
+  }
+  for (const std::string& held : robot.held) fmt::print("      held: {}\n", held);
+}
+
+void printTree(const UrdfRobot& robot, const JointVector& q) {
+  const LinkPoses X_L0L = linkPoses(robot.model, q);
+  std::vector<int> depth;
+  fmt::print("\n  {:<44}{:>10}{:>10}{:>10}   {}\n", "frame, and where it stands [m] in the first",
+             "x", "y", "z", "moved by");
+  for (const NamedFrame& f : robot.frames) {
+    depth.push_back(f.parent < 0 ? 0 : depth[static_cast<std::size_t>(f.parent)] + 1);
+    const Vec3 p = f.link < 0 ? f.X_link.p : Vec3((X_L0L[f.link] * f.X_link).p);
+    fmt::print("  {:<44}{:>10.4f}{:>10.4f}{:>10.4f}   {}\n",
+               std::string(static_cast<std::size_t>(std::min(depth.back(), 20)), ' ') + f.name,
+               p.x(), p.y(), p.z(), f.joint);
+  }
+}
+
+}  // namespace
+
+int robotCommand(int argc, char** argv) {
+  CLI::App cli(
+      "A robot description as it is understood: which joints move, which are held or follow, mass, "
+      "centre, moments, and every frame.",
+      "ves robot");
+  std::string file;
+  std::vector<std::string> sets;
+  cli.add_option("file", file, "a URDF, or a robot's .yaml as in config/robots")->required();
+  cli.add_option("--set", sets, "tip=LINK, joints=[..], lock.JOINT=VALUE (deg or m)")
+      ->allow_extra_args(false);
+  return run(cli, argc, argv, [&] {
+    const Value document = robotDocument(file, sets);
+    const Value& value = *document.find("robot");
+    Section s(value, "robot");
+    const Value* text = value.find("urdf_text");
+    if (!text) s.fail("urdf", "missing, want the robot's URDF file");
+    const UrdfRobot robot = chosenRobot(s, UrdfTree(text->text, *text->file));
+    const JointVector q = jointsOf(s, robot);
+    const RigidBody all = compositeBody(robot.model, q);
+    const Vec3 moments = symmetricEigenvalues(all.I_Bcm_B);
+    const Vec3& c = all.p_BoBcm_B;
+    fmt::print("{}: {} of {} links move by {} joints\n\n", *text->file, robot.model.size,
+               robot.frames.size(), robot.model.joints);
+    printJoints(robot, q);
+    fmt::print(
+        "\n  {:.6g} kg, centre at {:.4f}, {:.4f}, {:.4f} m in '{}', there {:.6g}, {:.6g}, {:.6g} "
+        "kg "
+        "m^2\n",
+        all.mass, c.x(), c.y(), c.z(), robot.frames.front().name, moments(0), moments(1),
+        moments(2));
+    printTree(robot, q);
+    if (!robot.choice.empty()) fmt::print("\n  {}\n", robot.choice);
+    for (const std::string& warning : robot.warnings) fmt::print("\n  {}\n", warning);
+    return kDone;
+  });
+}
+
+}  // namespace ves::app
