@@ -10,6 +10,7 @@
 #include <sstream>
 #include <utility>
 
+#include "thinning.hpp"
 #include "ves/results/gnuplot.hpp"
 
 namespace ves {
@@ -18,22 +19,10 @@ namespace {
 constexpr const char* kNoFigure = "<p>(gnuplot could not draw this figure)</p>";
 constexpr std::size_t kMostPoints = 700;  // [-] of a line: more than it has pixels
 
-/// Lines thinned by keeping the extremes of each run of points, so that no peak is lost.
 std::string data(const Line& line) {
   std::string out;
-  const std::size_t n = line.x.size();
-  const std::size_t bin = n <= kMostPoints ? 1 : (2 * n + kMostPoints - 1) / kMostPoints;
-  for (std::size_t i = 0; i < n; i += bin) {
-    std::size_t low = i, high = i;
-    for (std::size_t k = i; k < std::min(n, i + bin); ++k) {
-      if (line.y[k] < line.y[low]) low = k;
-      if (line.y[k] > line.y[high]) high = k;
-    }
-    for (const std::size_t k : {std::min(low, high), std::max(low, high)}) {
-      out += fmt::format("{:.6g} {:.6g}\n", line.x[k], line.y[k]);
-      if (low == high) break;
-    }
-  }
+  for (const std::size_t k : thinned(line.y, kMostPoints))
+    out += fmt::format("{:.6g} {:.6g}\n", line.x[k], line.y[k]);
   return out;
 }
 

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/results/plots.hpp"
 
+#include <fmt/compile.h>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <functional>
 #include <iterator>
+#include <vector>
 
+#include "thinning.hpp"
 #include "ves/base/coordinates.hpp"
 #include "ves/results/drift_samples.hpp"
 #include "ves/results/gnuplot.hpp"
@@ -49,11 +52,17 @@ class Page {
 
   void panel(const std::string& ylabel, const std::vector<Curve>& curves) {
     const bool bottom = ++drawn_ > panels_ - cols_;
+    constexpr std::size_t kMostDrawn = 1400;  // [-] two for a pixel of the widest panel
     for (std::size_t i = 0; i < curves.size(); ++i) {
+      std::vector<double> t, y;
+      for (const Row& row : series_.rows) {
+        if (row.t < span_.from || row.t > span_.to) continue;
+        t.push_back(row.t);
+        y.push_back(curves[i].value(row));
+      }
       fmt::format_to(std::back_inserter(script_), "$curve{} << EOD\n", i);
-      for (const Row& row : series_.rows)
-        if (row.t >= span_.from && row.t <= span_.to)
-          fmt::format_to(std::back_inserter(script_), "{} {}\n", row.t, curves[i].value(row));
+      for (const std::size_t k : thinned(y, kMostDrawn))
+        fmt::format_to(std::back_inserter(script_), FMT_COMPILE("{:.6g} {:.6g}\n"), t[k], y[k]);
       script_ += "EOD\n";
     }
     script_ += fmt::format("set ylabel {} offset 1\nset xlabel {}\nplot ", quoted(ylabel),

@@ -197,9 +197,10 @@ std::vector<Column> columns(const Experiment& experiment) {
   addLegs("reference", "m", &state_t::reference);
   addLegs("measured", "m", &state_t::leg_measured);
   for (int i = 0; i < static_cast<int>(experiment.joint_names.size()); ++i)
-    add(fmt::format(
-            "{}_{}", experiment.joint_names[static_cast<std::size_t>(i)],
-            experiment.controller.payload.robot.jointLink(i).type == JointType::kRevolute ? "rad" : "m"),
+    add(fmt::format("{}_{}", experiment.joint_names[static_cast<std::size_t>(i)],
+                    experiment.controller.payload.robot.jointLink(i).type == JointType::kRevolute
+                        ? "rad"
+                        : "m"),
         [=](const Row& r) { return r.has_sample ? r.sample.q[i] : NAN; });
   addChannels("bias", &state_t::bias);
   addChannels("deviation", &state_t::deviation);
