@@ -320,12 +320,13 @@ def attack_datagrams(rng, folder, count):
 
     def flood(process):
         nonlocal sent
+        begun = time.monotonic()
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
             while sent < count and running(process):
                 s.sendto(datagrams(rng), (GROUP, PORT))
                 sent += 1
-                if sent % 10 == 0:
-                    time.sleep(0.01)
+                if sent % 10 == 0:  # a thousand a second
+                    time.sleep(max(0.0, begun + sent / 1000 - time.monotonic()))
     run = Run(["run", "z_sine", "--no-plots", "--set", "safety.stall_ticks=500", "--set",
                "safety.overruns_per_second=500", "--set",
                f"program=[{{trajectory: {{duration_s: {count / 1000 + 1:.0f}, z: {{sine: {{amplitude_m: "
