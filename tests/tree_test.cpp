@@ -303,6 +303,26 @@ TEST(UrdfTree, RefusesJointsThatFollowNobodyOrThemselves) {
             std::string::npos);
 }
 
+TEST(UrdfTree, WhoFollowsAFollowerFollowsItsMaster) {  // 0.5 (-2 q + 0.3) + 0.1 = -q + 0.25
+  const auto joint = [](const std::string& name, const std::string& child,
+                        const std::string& mimic) {
+    return fmt::format(
+        "<link name=\"{}\"/><joint name=\"{}\" type=\"continuous\"><parent link=\"base\"/><child "
+        "link=\"{}\"/><axis xyz=\"0 0 1\"/>{}</joint>",
+        child, name, child, mimic);
+  };
+  const UrdfTree tree(
+      "<robot name=\"r\"><link name=\"base\"/>" +
+          joint("third", "c", "<mimic joint=\"second\" multiplier=\"0.5\" offset=\"0.1\"/>") +
+          joint("second", "b", "<mimic joint=\"first\" multiplier=\"-2\" offset=\"0.3\"/>") +
+          joint("first", "a", "") + "</robot>",
+      "r.urdf");
+  EXPECT_EQ(tree.find("third")->follows, "first");
+  EXPECT_DOUBLE_EQ(tree.find("third")->ratio, -1.0);
+  EXPECT_DOUBLE_EQ(tree.find("third")->offset, 0.25);
+  EXPECT_DOUBLE_EQ(tree.find("second")->offset, 0.3);
+}
+
 TEST(UrdfTree, RunsAsAnyRobot) {
   const std::string file =
       (std::filesystem::temp_directory_path() / fmt::format("ves_tree_{}.urdf", getpid())).string();
