@@ -18,33 +18,17 @@ Value robotDocument(const std::string& file, const std::vector<std::string>& set
   return document;
 }
 
-/// Joint values of the file; zero, or the limit next to it, where it has none.
-JointVector jointsOf(Section& s, const UrdfRobot& robot) {
-  JointVector q = JointVector::Zero();
-  const int n = robot.model.joints;
-  const bool given = n > 0 && s.has("joints_deg_or_m");
-  const Eigen::VectorXd values =
-      given ? s.vector("joints_deg_or_m", n, -1e6, 1e6) : Eigen::VectorXd::Zero(n);
-  for (int i = 0; i < n; ++i) {
-    const Link& link = robot.model.jointLink(i);
-    const double unit = link.type == JointType::kRevolute ? kDegree : 1.0;
-    q(i) = given ? values(i) * unit : std::clamp(0.0, link.lower, link.upper);
-  }
-  return q;
-}
-
 void printJoints(const UrdfRobot& robot, const JointVector& q) {
   const RobotModel& model = robot.model;
   for (int i = 0; i < model.joints; ++i) {
     const Link& link = model.jointLink(i);
-    const bool turns = link.type == JointType::kRevolute;
-    const double unit = turns ? kDegree : 1.0;
+    const double unit = jointUnit(link.type);
     const std::string range =
         std::isfinite(link.lower) || std::isfinite(link.upper)
             ? fmt::format("{:.6g} to {:.6g}", link.lower / unit, link.upper / unit)
             : "no limits";
     fmt::print("  {:>2}  {:<32} {:<24} {:<4} at {:.6g}\n", i + 1,
-               robot.joint_names[static_cast<std::size_t>(i)], range, turns ? "deg" : "m",
+               robot.joint_names[static_cast<std::size_t>(i)], range, jointUnitName(link.type),
                q(i) / unit);
   }
   for (const NamedFrame& frame : robot.frames) {
@@ -65,7 +49,7 @@ void printTree(const UrdfRobot& robot, const JointVector& q) {
              "x", "y", "z", "moved by");
   for (const NamedFrame& f : robot.frames) {
     depth.push_back(f.parent < 0 ? 0 : depth[static_cast<std::size_t>(f.parent)] + 1);
-    const Vec3 p = f.link < 0 ? f.X_link.p : Vec3((X_L0L[f.link] * f.X_link).p);
+    const Vec3 p = f.pose(X_L0L).p;
     fmt::print("  {:<44}{:>10.4f}{:>10.4f}{:>10.4f}   {}\n",
                std::string(static_cast<std::size_t>(std::min(depth.back(), 20)), ' ') + f.name,
                p.x(), p.y(), p.z(), f.joint);
@@ -91,7 +75,7 @@ int robotCommand(int argc, char** argv) {
     const Value* text = value.find("urdf_text");
     if (!text) s.fail("urdf", "missing, want the robot's URDF file");
     const UrdfRobot robot = chosenRobot(s, UrdfTree(text->text, *text->file));
-    const JointVector q = jointsOf(s, robot);
+    const JointVector q = initialJoints(s, robot);
     const RigidBody all = compositeBody(robot.model, q);
     const Vec3 moments = symmetricEigenvalues(all.I_Bcm_B);
     const Vec3& c = all.p_BoBcm_B;
@@ -100,8 +84,7 @@ int robotCommand(int argc, char** argv) {
     printJoints(robot, q);
     fmt::print(
         "\n  {:.6g} kg, centre at {:.4f}, {:.4f}, {:.4f} m in '{}', there {:.6g}, {:.6g}, {:.6g} "
-        "kg "
-        "m^2\n",
+        "kg m^2\n",
         all.mass, c.x(), c.y(), c.z(), robot.frames.front().name, moments(0), moments(1),
         moments(2));
     printTree(robot, q);

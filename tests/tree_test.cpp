@@ -95,9 +95,9 @@ TEST_P(Tree, JointEffortsAreKdls) {
     for (const auto& [name, segment] : kdl.getSegments()) {
       const UrdfTree::Joint* joint = tree.find(segment.segment.getJoint().getName());
       if (!joint) continue;
-      const std::string& master = joint->follows.empty() ? joint->name : joint->follows;
-      const auto i = std::find(robot.joint_names.begin(), robot.joint_names.end(), master) -
-                     robot.joint_names.begin();
+      const auto i =
+          std::find(robot.joint_names.begin(), robot.joint_names.end(), joint->master()) -
+          robot.joint_names.begin();
       const unsigned theirs = segment.q_nr;
       q(theirs) = joint->ratio * s.q(i) + joint->offset;
       qd(theirs) = joint->ratio * s.q_dot(i);
@@ -187,18 +187,14 @@ TEST_P(Tree, HeldJointsWeighWhatStandingOnesWeigh) {
   const LinkPoses X = linkPoses(robot.model, q), Y = linkPoses(fewer.model, rest);
   ASSERT_EQ(robot.frames.size(), fewer.frames.size());
   for (std::size_t i = 0; i < robot.frames.size(); ++i) {
-    const auto pose = [](const NamedFrame& f, const LinkPoses& links) {
-      return f.link < 0 ? f.X_link : links[f.link] * f.X_link;
-    };
-    const Transform was = pose(robot.frames[i], X), is = pose(fewer.frames[i], Y);
+    const Transform was = robot.frames[i].pose(X), is = fewer.frames[i].pose(Y);
     EXPECT_LT((was.p - is.p).norm() + (was.R - is.R).norm(), 1e-12) << robot.frames[i].name;
   }
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, Tree, testing::Range(1u, 11u));
 
-// --- What is asked of a description
-// ---------------------------------------------------------------
+// --- What is asked of a description --------------------------------------------------------------
 
 constexpr const char* kGripper = R"(<robot name="r">
 <link name="base"/><link name="arm"/><link name="left"/><link name="right"/><link name="tool"/>

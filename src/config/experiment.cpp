@@ -153,7 +153,7 @@ Experiment build(const Value& document) {
                                              "identify again",
                                              masses.kinematics, kinematicsOf(c.payload)));
     if (std::ssize(masses.bodies) != c.payload.robot.size + 1)
-      section.fail("bodies", fmt::format("are {}, want {}: link 0 and a link for each joint",
+      section.fail("bodies", fmt::format("are {}, want {}: link 0 and every link that moves",
                                          masses.bodies.size(), c.payload.robot.size + 1));
     c.payload = withMasses(c.payload, masses);
   }

@@ -104,8 +104,8 @@ class ProgramReader {
       s.fail("joint",
              fmt::format("'{}', want one of {}", joint, fmt::join(robot_->joint_names, ", ")));
     event.move.joint = static_cast<int>(at - robot_->joint_names.begin());
-    event.move.target =
-        s.number("to_deg_or_m", -1e6, 1e6) * jointUnit(robot_->model.jointLink(event.move.joint));
+    event.move.target = s.number("to_deg_or_m", -1e6, 1e6) *
+                        jointUnit(robot_->model.jointLink(event.move.joint).type);
     requireInLimits(s, "to_deg_or_m", *robot_, event.move.joint, event.move.target);
     s.finish();
     out_.plant.robot_events.push_back(event);

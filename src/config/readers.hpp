@@ -57,7 +57,6 @@ struct Robot {
   JointVector q = JointVector::Zero();
 };
 Robot readRobot(Section s, const Value& document);
-double jointUnit(const Link& link);
 /// Fails at `key` unless the joint may be at q [rad | m].
 void requireInLimits(const Section& s, std::string_view key, const UrdfRobot& robot, int joint,
                      double q);

@@ -8,16 +8,18 @@
 
 namespace ves {
 
-double jointUnit(const Link& link) { return link.type == JointType::kRevolute ? kDegree : 1.0; }
+double jointUnit(JointType type) { return type == JointType::kRevolute ? kDegree : 1.0; }
+
+const char* jointUnitName(JointType type) { return type == JointType::kRevolute ? "deg" : "m"; }
 
 void requireInLimits(const Section& s, std::string_view key, const UrdfRobot& robot, int joint,
                      double q) {
   const Link& link = robot.model.jointLink(joint);
+  const double unit = jointUnit(link.type);
   if (!(q >= link.lower - 1e-9 && q <= link.upper + 1e-9))
     s.fail(key, fmt::format("joint '{}' at {:.6g}, want [{:.6g}, {:.6g}] {}",
-                            robot.joint_names[static_cast<std::size_t>(joint)], q / jointUnit(link),
-                            link.lower / jointUnit(link), link.upper / jointUnit(link),
-                            link.type == JointType::kRevolute ? "deg" : "m"));
+                            robot.joint_names[static_cast<std::size_t>(joint)], q / unit,
+                            link.lower / unit, link.upper / unit, jointUnitName(link.type)));
 }
 
 UrdfRobot chosenRobot(Section& s, const UrdfTree& tree) {
@@ -55,8 +57,8 @@ UrdfRobot chosenRobot(Section& s, const UrdfTree& tree) {
       if (s.has("joints") && moving.count(name))
         lock.fail(name, "joints lets it move, want one of the two");
       moving.erase(name);
-      held[name] =
-          lock.number(name, joint.lower / joint.unit(), joint.upper / joint.unit()) * joint.unit();
+      const double unit = jointUnit(joint.type);
+      held[name] = lock.number(name, joint.lower / unit, joint.upper / unit) * unit;
     }
     lock.finish();
   }
@@ -77,6 +79,27 @@ UrdfRobot chosenRobot(Section& s, const UrdfTree& tree) {
   return out;
 }
 
+JointVector initialJoints(Section& s, const UrdfRobot& robot) {
+  constexpr const char* kKey = "joints_deg_or_m";
+  JointVector q = JointVector::Zero();
+  const int joints = robot.model.joints;
+  if (!s.has(kKey)) {
+    for (int i = 0; i < joints; ++i) {
+      const Link& link = robot.model.jointLink(i);
+      q(i) = std::clamp(0.0, link.lower, link.upper);
+    }
+  } else if (joints > 0) {
+    q.head(joints) = s.vector(kKey, joints, -1e6, 1e6);
+    for (int i = 0; i < joints; ++i) {
+      q(i) *= jointUnit(robot.model.jointLink(i).type);
+      requireInLimits(s, kKey, robot, i, q(i));
+    }
+  } else if (!s.texts(kKey).empty()) {
+    s.fail(kKey, "the robot has no joint that moves, want none");
+  }
+  return q;
+}
+
 Robot readRobot(Section s, const Value& document) {
   Robot robot;
   const Value* text = document.find("robot")->find("urdf_text");
@@ -87,21 +110,7 @@ Robot readRobot(Section s, const Value& document) {
   robot.adapter_R = readBox(s.section("adapter"));
   robot.X_RL0 = {rotation(s.vector("mount_rpy_deg", 3, -360.0, 360.0) * kDegree),
                  s.vector("mount_m", 3, -10.0, 10.0)};
-  const int joints = robot.urdf.model.joints;
-  if (!s.has("joints_deg_or_m")) {
-    for (int i = 0; i < joints; ++i) {
-      const Link& link = robot.urdf.model.jointLink(i);
-      robot.q(i) = std::clamp(0.0, link.lower, link.upper);
-    }
-  } else if (joints > 0) {
-    const Eigen::VectorXd q = s.vector("joints_deg_or_m", joints, -1e6, 1e6);
-    for (int i = 0; i < joints; ++i) {
-      robot.q(i) = q(i) * jointUnit(robot.urdf.model.jointLink(i));
-      requireInLimits(s, "joints_deg_or_m", robot.urdf, i, robot.q(i));
-    }
-  } else if (!s.texts("joints_deg_or_m").empty()) {
-    s.fail("joints_deg_or_m", "the robot has no joint that moves, want none");
-  }
+  robot.q = initialJoints(s, robot.urdf);
   s.finish();
   return robot;
 }

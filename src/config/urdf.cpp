@@ -102,9 +102,8 @@ class UrdfTree::Impl {
         here = carried.at(link->getParent().get());
         here.X = here.X * originOf(joint);
         if (const Joint* own = find(joint.name)) {
-          const std::string& master = own->follows.empty() ? own->name : own->follows;
           Link next = linkOf(joint, *own);
-          if (moving.count(master)) {
+          if (moving.count(own->master())) {
             next.parent = here.link;
             next.X_parent = here.X;
             here = {addTo(out, next, *own), {}};
@@ -112,8 +111,8 @@ class UrdfTree::Impl {
           } else {
             const double q = heldAt(*own, held);
             here.X = here.X * linkPose(next, q);
-            out.held.push_back(fmt::format("joint '{}' at {:.6g} {}", own->name, q / own->unit(),
-                                           own->type == JointType::kRevolute ? "deg" : "m"));
+            out.held.push_back(fmt::format("joint '{}' at {:.6g} {}", own->name,
+                                           q / jointUnit(own->type), jointUnitName(own->type)));
           }
         }
       }
@@ -243,20 +242,16 @@ class UrdfTree::Impl {
 
   /// Returns its index.
   int addTo(UrdfRobot& out, Link link, const Joint& own) const {
-    RobotModel& model = out.model;
-    if (model.size == kMaxLinks)
-      refuse("joint", own.name, fmt::format("one too many, at most {} may move", kMaxLinks));
-    const bool follows = !own.follows.empty();
-    if (!follows && model.joints == kMaxJoints)
-      refuse("joint", own.name, fmt::format("one too many, at most {} may move", kMaxJoints));
-    if (follows)
-      link.joint =
-          static_cast<int>(std::find(out.joint_names.begin(), out.joint_names.end(), own.follows) -
-                           out.joint_names.begin());
-    if (link.joint >= kMaxJoints)
-      refuse("joint", own.name, fmt::format("one too many, at most {} may move", kMaxJoints));
-    model.add(link, follows);
-    return model.size - 1;
+    const auto refuseMore = [&](int most) {
+      refuse("joint", own.name, fmt::format("one too many, at most {} may move", most));
+    };
+    if (out.model.size == kMaxLinks) refuseMore(kMaxLinks);
+    link.joint =
+        static_cast<int>(std::find(out.joint_names.begin(), out.joint_names.end(), own.master()) -
+                         out.joint_names.begin());
+    if (link.joint >= kMaxJoints) refuseMore(kMaxJoints);
+    out.model.add(link, !own.follows.empty());
+    return out.model.size - 1;
   }
 
   double heldAt(const Joint& joint, const std::map<std::string, double>& held) const {
@@ -307,6 +302,7 @@ class UrdfTree::Impl {
   int lineOf(const std::string& element, const std::string& name) const {
     return lineAt(offsetOf(element, name));
   }
+  /// Of every joint's element in the text, by name: urdfdom sorts joints by theirs.
   std::map<std::string, std::size_t> placesOfJoints() const {
     std::map<std::string, std::size_t> out;
     for (std::size_t at = 0; (at = text_.find("<joint", at)) != std::string::npos; ++at) {
@@ -349,8 +345,6 @@ class UrdfTree::Impl {
   std::map<std::string, std::size_t> index_;  // of joints_
 };
 
-double UrdfTree::Joint::unit() const { return type == JointType::kRevolute ? kDegree : 1.0; }
-
 UrdfTree::UrdfTree(const std::string& text, const std::string& file)
     : impl_(std::make_unique<Impl>(text, file)) {}
 UrdfTree::~UrdfTree() = default;
@@ -364,8 +358,7 @@ bool UrdfTree::hasLink(const std::string& link) const { return impl_->link(link)
 std::set<std::string> UrdfTree::jointsTo(const std::string& link) const {
   std::set<std::string> out;
   for (const urdf::Link* at = impl_->link(link); at && at->parent_joint; at = at->getParent().get())
-    if (const Joint* joint = find(at->parent_joint->name))
-      out.insert(joint->follows.empty() ? joint->name : joint->follows);
+    if (const Joint* joint = find(at->parent_joint->name)) out.insert(joint->master());
   return out;
 }
 

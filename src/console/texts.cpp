@@ -30,8 +30,8 @@ std::string evidence(const state_t& s, const Experiment& experiment) {
     case StillnessViolation::kJoint: {
       const bool known = i < experiment.joint_names.size();
       const bool turns =
-          known &&
-          experiment.controller.payload.robot.jointLink(s.violation_index).type == JointType::kRevolute;
+          known && experiment.controller.payload.robot.jointLink(s.violation_index).type ==
+                       JointType::kRevolute;
       return fmt::format("{} moved by {:.4f} {} ({} allowed)",
                          known ? experiment.joint_names[i] : fmt::format("joint {}", i + 1),
                          s.violation_amount, turns ? "rad" : "m", limits.joint);

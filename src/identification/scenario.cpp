@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "ves/config/urdf.hpp"
+
 namespace ves {
 namespace {
 
@@ -36,7 +38,7 @@ std::string scenarioOf(const PosePlan& plan, const Experiment& experiment, const
   const auto moves = [&](const JointVector& to, double start, double time) {
     std::string text;
     for (int i = 0; i < robot.joints; ++i) {
-      const double unit = robot.jointLink(i).type == JointType::kRevolute ? kDegree : 1.0;
+      const double unit = jointUnit(robot.jointLink(i).type);
       text += fmt::format("{}{{at_s: {:.2f}, duration_s: {:.2f}, joint: {}, to_deg_or_m: {:.6g}}}",
                           text.empty() ? "" : ",\n             ", start, time,
                           experiment.joint_names[static_cast<std::size_t>(i)], to(i) / unit);

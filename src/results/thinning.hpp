@@ -9,8 +9,8 @@
 
 namespace ves {
 
-/// Indices of at most about `most` points: of every run of points the lowest and the highest, so
-/// that no peak is lost. All where there are no more.
+/// Indices of about `most` points at most: the points are cut into equal runs, and the lowest and
+/// the highest of each run stay. So no peak is lost. All stay where there are no more than `most`.
 inline std::vector<std::size_t> thinned(const std::vector<double>& y, std::size_t most) {
   const std::size_t n = y.size();
   const std::size_t bin = n <= most ? 1 : (2 * n + most - 1) / most;

@@ -94,9 +94,9 @@ Line distanceOverTime(const Emulation& e, const char* name, std::size_t colour) 
   return out;
 }
 
-/// Of the two lowest modes of base and robot, let go from a centimetre and a half.
-void addedDamping(Reproduction& r, const std::string& scenario, const std::string& what,
-                  Overrides set, Numbers& numbers, TableRows& table) {
+/// A row of the two lowest modes of base and robot, let go from a centimetre and a half.
+TableRow addedDamping(Reproduction& r, const std::string& scenario, const std::string& what,
+                      Overrides set, Numbers& numbers) {
   std::int64_t duration = 0;
   const std::vector<CoupledMode> modes = coupledModes(interactionOf(r.load(scenario), duration));
   std::vector<std::string> row = {what};
@@ -111,12 +111,12 @@ void addedDamping(Reproduction& r, const std::string& scenario, const std::strin
                {fmt::format("{:.3f}", modes[j].frequency),
                 fmt::format("{:.4f}", modes[j].damping_ratio), fmt::format("{:+.4f}", added)});
   }
-  table.push_back(row);
+  return row;
 }
 
-/// One of the eight runs of 4.3 beside the robot on its base in free space: rows of tables. Lines
-/// of `distances` for the run that the figure shows.
-void oneOnTheArm(Reproduction& r, const Run43& which, TableRows& rows, TableRows& damping,
+/// One of the eight runs of 4.3 beside the robot on its base in free space: a row of each table.
+/// The run that the figure shows, and no other, writes `distances`.
+void oneOnTheArm(Reproduction& r, const Run43& which, TableRow& row, TableRow& damping,
                  Panel& distances) {
   const std::string scenario = "srms_" + which.configuration + "_" + which.robot,
                     what = title(which.configuration, which.robot);
@@ -124,7 +124,7 @@ void oneOnTheArm(Reproduction& r, const Run43& which, TableRows& rows, TableRows
                   six = {"base.keep_modes=6", "controller.stability=forced"};
   const Overrides all = compensation(true, true, true);
   Numbers& own = r.numbers["beyond"][scenario];
-  std::vector<std::string> row = {what};
+  row = {what};
   const auto add = [&](const char* key, const Overrides& set) {
     const Reproduction::Run run = r.run(scenario, set);
     const std::optional<Emulation> e = r.emulation(run.series);
@@ -143,22 +143,15 @@ void oneOnTheArm(Reproduction& r, const Run43& which, TableRows& rows, TableRows
   add("six modes, as published, no noise",
       with(with(compensation(false, false, false), six), quiet));
   add("six modes, all, no noise", with(with(all, six), quiet));
-  rows.push_back(row);
-  addedDamping(r, scenario, what, with(all, quiet), own, damping);
+  damping = addedDamping(r, scenario, what, with(all, quiet), own);
 }
 
 void onTheArm(Reproduction& r) {
-  TableRows rows_of[kRuns], damping_of[kRuns], rows, damping;
-  Panel distances_of[kRuns], distances{"time [s]", "distance [mm]", {}, false};
+  TableRows rows(kRuns), damping(kRuns);
+  Panel distances{"time [s]", "distance [mm]", {}, false};
   r.parts(kRuns, [&](Reproduction& piece, std::size_t i) {
-    oneOnTheArm(piece, runOf(i), rows_of[i], damping_of[i], distances_of[i]);
+    oneOnTheArm(piece, runOf(i), rows[i], damping[i], distances);
   });
-  for (std::size_t i = 0; i < kRuns; ++i) {
-    rows.insert(rows.end(), rows_of[i].begin(), rows_of[i].end());
-    damping.insert(damping.end(), damping_of[i].begin(), damping_of[i].end());
-    distances.lines.insert(distances.lines.end(), distances_of[i].lines.begin(),
-                           distances_of[i].lines.end());
-  }
   r.page.text(
       "The platform's motion beside that of the robot on its base in free space, nothing left "
       "out: rms of the distance, percent of the base's largest motion. A run that ends itself is "

@@ -23,16 +23,20 @@ namespace ves {
 
 using Numbers = nlohmann::ordered_json;
 using Overrides = std::vector<std::string>;
-using TableRows = std::vector<std::vector<std::string>>;
+using TableRow = std::vector<std::string>;
+using TableRows = std::vector<TableRow>;
 
 inline constexpr double kMilli = 1e3;  // [1/m] millimetres
 inline constexpr const char* kConfigurations[] = {"unberth", "low_hover", "deploy", "capture"};
 inline constexpr const char* kRobots[] = {"puma", "doss"};
-inline constexpr std::size_t kRuns = 8;  // [-] of 4.3, in its order
+/// [-] of 4.3, in its order
+inline constexpr std::size_t kRuns = std::size(kConfigurations) * std::size(kRobots);
 struct Run43 {
   std::string configuration, robot;
 };
-inline Run43 runOf(std::size_t i) { return {kConfigurations[i % 4], kRobots[i / 4]}; }
+inline Run43 runOf(std::size_t i) {
+  return {kConfigurations[i % std::size(kConfigurations)], kRobots[i / std::size(kConfigurations)]};
+}
 
 inline std::string mm(double x) { return fmt::format("{:.2f}", x * kMilli); }
 inline std::string percent(double x) { return fmt::format("{:.2f}", 100.0 * x); }

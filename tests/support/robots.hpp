@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Robots for the tests, and KDL's chain of the same URDF by a route of its own.
+// Robots for the tests, and KDL's tree of the same URDF by a route of its own.
 #pragma once
 
 #include <urdf_parser/urdf_parser.h>
@@ -27,36 +27,6 @@ inline std::string readText(const std::string& file) {
 inline UrdfRobot robot(const std::string& name) {
   const std::string file = configDir() + "/robots/" + name + ".urdf";
   return loadUrdf(readText(file), file);
-}
-
-/// The chain that KDL makes of the URDF, link by link, fixed joints as they are.
-inline KDL::Chain kdlChain(const std::string& name) {
-  const auto model = urdf::parseURDF(readText(configDir() + "/robots/" + name + ".urdf"));
-  KDL::Chain chain;
-  const auto frame = [](const urdf::Pose& p) {
-    return KDL::Frame(
-        KDL::Rotation::Quaternion(p.rotation.x, p.rotation.y, p.rotation.z, p.rotation.w),
-        KDL::Vector(p.position.x, p.position.y, p.position.z));
-  };
-  auto link = model->getRoot();
-  while (!link->child_joints.empty()) {
-    const urdf::Joint& joint = *link->child_joints[0];
-    link = model->getLink(joint.child_link_name);
-    const KDL::Frame f = frame(joint.parent_to_joint_origin_transform);
-    const KDL::Vector axis = f.M * KDL::Vector(joint.axis.x, joint.axis.y, joint.axis.z);
-    const urdf::Inertial& in = *link->inertial;
-    // Inertial frames are not turned in these files.
-    chain.addSegment(
-        KDL::Segment(link->name,
-                     KDL::Joint(joint.name, f.p, axis,
-                                joint.type == urdf::Joint::PRISMATIC ? KDL::Joint::TransAxis
-                                                                     : KDL::Joint::RotAxis),
-                     f,
-                     KDL::RigidBodyInertia(
-                         in.mass, frame(in.origin).p,
-                         KDL::RotationalInertia(in.ixx, in.iyy, in.izz, in.ixy, in.ixz, in.iyz))));
-  }
-  return chain;
 }
 
 /// The tree that KDL makes of a URDF's text, link by link, fixed joints as they are.
@@ -95,6 +65,17 @@ inline KDL::Tree kdlTree(const std::string& text) {
     }
   }
   return tree;
+}
+
+/// The serial arm of a robot of config, from its base to its last link.
+inline KDL::Chain kdlChain(const std::string& name) {
+  const KDL::Tree tree = kdlTree(readText(configDir() + "/robots/" + name + ".urdf"));
+  std::string tip = tree.getRootSegment()->first;
+  for (auto at = tree.getRootSegment(); !at->second.children.empty(); tip = at->first)
+    at = at->second.children.front();
+  KDL::Chain chain;
+  tree.getChain(tree.getRootSegment()->first, tip, chain);
+  return chain;
 }
 
 }  // namespace ves::test

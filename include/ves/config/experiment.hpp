@@ -27,12 +27,12 @@ struct Experiment {
   plant::PlantConfig plant;
   std::vector<std::string> joint_names;
   std::vector<std::string> warnings;
-  std::vector<std::string> notes;  // known oddities of a robot's file
+  std::vector<std::string> notes;                // known oddities of a robot's file
   std::optional<CalibrationRecord> calibration;  // that the bias comes from
   std::string setup;     // hash of what a calibration depends on: sensor, robot, gravity
   int substitutes = 0;   // [-] numbers that stand in for unknown ones
-  Value document;        // what it was built from, everything inside
-  std::string resolved;  // the same as YAML with everything inside, URDF too; parseExperiment() reads it back
+  Value document;        // what it was built from, URDF inside
+  std::string resolved;  // the same as YAML; parseExperiment() reads it back
   std::string hash;      // of `resolved`
 };
 

@@ -21,7 +21,14 @@ struct NamedFrame {
   int link = -1;      // [-] index of the moving link that carries it; -1: link 0
   Transform X_link;   // its pose in that link's frame
   std::string joint;  // that moves it against its parent; empty: none
+
+  /// In L0.
+  Transform pose(const LinkPoses& X_L0L) const { return link < 0 ? X_link : X_L0L[link] * X_link; }
 };
+
+/// Joint values in files: [rad/deg] of one that turns, [1] of one that slides.
+double jointUnit(JointType type);
+const char* jointUnitName(JointType type);  // "deg" | "m"
 
 struct UrdfRobot {
   RobotModel model;
@@ -48,7 +55,8 @@ class UrdfTree {
     std::string follows;               // the joint whose value moves it (mimic); empty: its own
     double ratio = 1.0, offset = 0.0;  // [-], [rad | m] stands at ratio * value + offset
 
-    double unit() const;  // [rad/deg | 1]
+    /// Of the joint whose value moves it.
+    const std::string& master() const { return follows.empty() ? name : follows; }
   };
 
   /// `file` is for messages only.
@@ -78,6 +86,10 @@ class UrdfTree {
 /// "tip", "joints" and "lock" of a robot's file: which joints move, and where the others are held.
 /// Without them all move.
 UrdfRobot chosenRobot(Section& s, const UrdfTree& tree);
+
+/// "joints_deg_or_m" of a robot's file, inside their limits [rad | m]; without it zero, or the
+/// limit next to it.
+JointVector initialJoints(Section& s, const UrdfRobot& robot);
 
 /// The robot in which all joints move.
 UrdfRobot loadUrdf(const std::string& text, const std::string& file);
