@@ -41,7 +41,7 @@ int plan(const std::string& scenario, const PosePlanOptions& options, double spe
   const std::filesystem::path base = findScenario(scenario, configFolder());
   const Experiment e = loadExperiment(base);
   printWarnings(e);
-  if (e.joint_names.empty())
+  if (e.robot.joint_names.empty())
     throw InputError(fmt::format("{}: has no robot with joints to identify", base.string()));
   if (!(e.controller.gravity.norm() > 0.0))
     throw InputError(fmt::format("{}: gravity_m_per_s2: 0, want weight to feel", base.string()));

@@ -72,7 +72,7 @@ INSTANTIATE_TEST_SUITE_P(
     Causes, CalibrationIsRefused,
     testing::Values(Restless{"robot_moves", "seed=1", StillnessViolation::kJoint, 1,
                              [](Rig& rig) {
-                               rig.plant().moveRobot({1, 0.0, 30.0});
+                               rig.plant().moveRobot(RobotMove{1, 0.0, 30.0});
                                rig.run(300);
                              }},
                     Restless{"leg_creeps", "seed=1", StillnessViolation::kLeg, 4,
@@ -88,7 +88,7 @@ TEST(Calibration, WaitsForTheRobotToComeToRest) {
   const Experiment e = experiment("puma_on_table_4_1");
   Rig rig(e);
   rig.arm();
-  rig.plant().moveRobot({1, -1.0, 1.5});
+  rig.plant().moveRobot(RobotMove{1, -1.0, 1.5});
   rig.order(Request::kRun, segment(SegmentKind::kCalibration));
   const TickState& s = rig.until(Phase::kArmed);
   EXPECT_EQ(s.calibration, Calibration::Status::kDone);

@@ -38,7 +38,7 @@ TEST(Config, ResolvedTextReadsBackToTheSameExperiment) {
     EXPECT_EQ(back.hash, e.hash);
     EXPECT_EQ(back.controller.sensor.C_proc, e.controller.sensor.C_proc);
     EXPECT_EQ(back.controller.program.size, e.controller.program.size);
-    EXPECT_EQ(back.joint_names, e.joint_names);
+    EXPECT_EQ(back.robot.joint_names, e.robot.joint_names);
   }
 }
 

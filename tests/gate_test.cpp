@@ -48,8 +48,8 @@ TEST(Gate, ItsWorstIsTheWorstOfAllPosesAndBothDirections) {
     const LoopVerdict v = assessStability(e.controller, e.plant);
     double most = 0.0, of_last = 0.0;
     for (const Direction direction : {Direction::kExtending, Direction::kRetracting})
-      for (const JointVector& q : programPoses(e.controller.program, e.plant)) {
-        of_last = dominantRoot(loopOf(e.controller, e.plant, q, direction)).radius;
+      for (const ProgramRobot& one : programRobots(e.controller, e.plant)) {
+        of_last = dominantRoot(loopOf(e.controller, e.plant, one.q, direction)).radius;
         most = std::max(most, of_last);
       }
     EXPECT_NEAR(v.worst.radius, most, 1e-9) << e.name;
@@ -167,17 +167,17 @@ TEST(Gate, LooksAtEachMotionWhateverElseThereIs) {
        "joint: joint_3, to_deg_or_m: 60}, {at_s: 4, duration_s: 1, joint: joint_1, to_deg_or_m: "
        "0}, "
        "{at_s: 1, duration_s: 1, joint: joint_1, to_deg_or_m: 100}]}]"});
-  const auto poses = programPoses(e.controller.program, e.plant);
+  const auto poses = programRobots(e.controller, e.plant);
   const auto near = [&](int joint, double degrees) {
-    return std::any_of(poses.begin(), poses.end(), [&](const JointVector& q) {
-      return std::abs(q(joint) / kDegree - degrees) < 8.0;
+    return std::any_of(poses.begin(), poses.end(), [&](const ProgramRobot& one) {
+      return std::abs(one.q(joint) / kDegree - degrees) < 8.0;
     });
   };
   EXPECT_TRUE(near(0, 50.0));
   EXPECT_TRUE(near(0, 100.0));
   EXPECT_TRUE(near(2, 75.0));
   EXPECT_TRUE(near(1, -45.0));  // begun before admittance control, and still under way in it
-  EXPECT_NEAR(poses.back()(0), 0.0, 1e-9);
+  EXPECT_NEAR(poses.back().q(0), 0.0, 1e-9);
 }
 
 TEST(Gate, TakesTheRobotAsTheControllerKnowsIt) {

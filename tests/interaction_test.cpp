@@ -46,7 +46,7 @@ double energy(const Interaction& i, const InteractionPoint& p, const RigidBody& 
 Interaction letGo(InteractionOptions& options) {
   Interaction i = interaction("srms_unberth_doss", {"base.keep_modes=6"});
   i.base.damping.setZero();
-  i.moves.clear();
+  i.actions.clear();
   options.duration = 10'000'000'000;
   options.tolerance = 1e-11;
   options.eta = VectorXd::Zero(6);
@@ -99,7 +99,7 @@ TEST(Interaction, SplitAndWholeBeginAlikeUnderAPointMass) {
   Interaction i = interaction("srms_unberth_doss", {"base.keep_modes=6"});
   i.base.stiffness.setZero();
   i.base.damping.setZero();
-  i.moves.clear();
+  i.actions.clear();
   for (Link& link : i.payload.robot.links) link.body = {};
   i.payload.top_plate_S = i.payload.adapter_R = {};
   i.payload.robot.base = {900.0, {0.3, -0.2, 0.5}, Mat3::Zero()};
@@ -147,7 +147,8 @@ TEST(Interaction, MomentumOfAFreeBaseAndItsRobotStaysZero) {
       inertia.cwiseSqrt().cwiseInverse();
   i.base.stiffness = VectorXd::Zero(6);
   i.base.damping = MatrixXd::Zero(6, 6);
-  i.moves = {{0, {2, -0.3, 2.0}}, {500'000'000, {0, 0.8, 2.0}}};
+  const RobotMove first{2, -0.3, 2.0}, second{0, 0.8, 2.0};
+  i.actions = {{0, first}, {500'000'000, second}};
   InteractionOptions options;
   options.model = InteractionModel::kWhole;
   options.step = 1'000'000;
@@ -157,9 +158,9 @@ TEST(Interaction, MomentumOfAFreeBaseAndItsRobotStaysZero) {
 
   const RobotModel robot = carried(i.payload);
   JointPaths joints(robot.joints, i.q0);
-  joints.move(i.moves[0].move, 0);
+  joints.move(first, 0);
   JointPaths later = joints;
-  later.move(i.moves[1].move, i.moves[1].start);
+  later.move(second, i.actions[1].start);
   const auto index = [](double t) { return static_cast<std::size_t>(std::lround(t * 1e3)); };
   const auto X_IL0 = [&](double t) {
     const InteractionPoint& p = points[index(t)];
@@ -167,7 +168,7 @@ TEST(Interaction, MomentumOfAFreeBaseAndItsRobotStaysZero) {
   };
   const auto q = [&](double t) {
     const auto ns = std::llround(t * 1e9);
-    return (ns < i.moves[1].start ? joints : later).at(ns).q;
+    return (ns < i.actions[1].start ? joints : later).at(ns).q;
   };
   double most_linear = 0.0, most_angular = 0.0;
   for (double t = 0.1; t < 2.5; t += 0.1) {

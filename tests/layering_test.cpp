@@ -30,10 +30,11 @@ const std::map<std::string, Names> kMayInclude = [] {
   add("kinematics", {}, "math");
   add("robot", {}, "math");
   add("control", {"robot"}, "kinematics");
-  add("plant", {}, "control");
+  add("planning", {"base"}, "robot");
+  add("plant", {"planning", "base"}, "control");
   add("simulation", {}, "plant");
-  add("srms", {}, "control");
-  add("analysis", {"base"}, "plant");
+  add("srms", {"planning", "base"}, "control");
+  add("analysis", {}, "plant");
   add("config", {"srms"}, "analysis");
   add("identification", {}, "config");
   add("realtime", {}, "base");

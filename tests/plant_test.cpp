@@ -227,21 +227,21 @@ TEST(Plant, FiltersDelayTheOutputsOnly) {
 TEST(Plant, JointsFollowAFifthOrderPolynomial) {
   Experiment e = experiment("puma_tilt");
   Plant plant(e.plant);
-  EXPECT_TRUE(plant.moveRobot({0, 30 * kDegree, 5.0}));
+  EXPECT_TRUE(plant.moveRobot(RobotMove{0, 30 * kDegree, 5.0}));
   for (int k = 1; k <= 600; ++k) {
     plant.advance(k * 10'000'000LL);
     const Sample s = plant.sample();
     const double u = std::min(1.0, k * 0.01 / 5.0);
     ASSERT_NEAR(s.q(0), 30 * kDegree * u * u * u * (10 - 15 * u + 6 * u * u), 1e-12);
   }
-  EXPECT_FALSE(plant.moveRobot({6, 0.0, 1.0}));
-  EXPECT_FALSE(plant.moveRobot({0, NAN, 1.0}));
-  EXPECT_FALSE(plant.moveRobot({0, 1.0, 0.0}));
+  EXPECT_FALSE(plant.moveRobot(RobotMove{6, 0.0, 1.0}));
+  EXPECT_FALSE(plant.moveRobot(RobotMove{0, NAN, 1.0}));
+  EXPECT_FALSE(plant.moveRobot(RobotMove{0, 1.0, 0.0}));
 }
 
 TEST(Plant, CuesCountFromTheSegmentsFirstCommand) {
   Experiment e = experiment("puma_on_table_4_1");
-  e.plant.robot_events = {{{2, 500'000'000}, {0, 0.5, 1.0}}};
+  e.plant.robot_events = {{{2, 500'000'000}, RobotMove{0, 0.5, 1.0}}};
   e.plant.faults = {{{2, 300'000'000}, 100'000'000, plant::Fault::kFloorMat}};
   Plant plant(e.plant);
   LegCommand command;

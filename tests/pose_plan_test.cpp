@@ -82,11 +82,12 @@ TEST(PosePlan, ItsScenarioMovesNoJointFasterThanAsked) {
   double fastest = 0.0;
   ASSERT_GT(planned.plant.robot_events.size(), 100u);
   for (const plant::RobotEvent& event : planned.plant.robot_events) {
-    const int i = event.move.joint;
+    const RobotMove& move = std::get<RobotMove>(event.action);
+    const int i = move.joint;
     const bool turns = e.controller.payload.robot.jointLink(i).type == JointType::kRevolute;
-    fastest = std::max(fastest, std::abs(event.move.target - at(i)) / event.move.duration /
-                                    (turns ? kDegree : 0.01));
-    at(i) = event.move.target;
+    fastest =
+        std::max(fastest, std::abs(move.target - at(i)) / move.duration / (turns ? kDegree : 0.01));
+    at(i) = move.target;
   }
   EXPECT_LE(fastest, speed * (1.0 + 1e-6));
   EXPECT_GT(fastest, 0.9 * speed);

@@ -7,7 +7,7 @@
 #include "support/momentum.hpp"
 #include "support/poses.hpp"
 #include "support/robots.hpp"
-#include "ves/robot/joint_paths.hpp"
+#include "ves/planning/joint_paths.hpp"
 #include "ves/robot/newton_euler.hpp"
 
 namespace ves {

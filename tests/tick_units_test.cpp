@@ -209,14 +209,15 @@ TEST(RobotInertia, IsMassTimesAccelerationOfAPlatformThatSlides) {
   BodyMotion P{g.fromHome({}), Vec3::Zero(), Vec3::Zero(), a, Vec3::Zero()};
   const LegMotion legs = legMotion(g, P);
   const JointVector q = JointVector::Zero();
-  EXPECT_EQ(inertia.update(0, q, P.X, legs, false, 1.0).stacked().norm(), 0.0);  // not engaged
-  const Wrench F = inertia.update(0, q, P.X, legs, true, 0.5);
+  EXPECT_EQ(inertia.update(KnownPayload(config), 0, q, P.X, legs, false, 1.0).stacked().norm(),
+            0.0);  // not engaged
+  const Wrench F = inertia.update(KnownPayload(config), 0, q, P.X, legs, true, 0.5);
   const double mass = 52.45 + 16.0 + 5.0;  // the PUMA with link 0, adapter, top plate
   EXPECT_LT((F.f - 0.5 * mass * a).norm(), 1e-9 * mass);
   EXPECT_NEAR(inertia.M_1()(0, 0), 0.5 * mass, 1e-9);
   ControllerConfig published = puma();
   RobotInertia none(published);
-  EXPECT_EQ(none.update(0, q, P.X, legs, true, 1.0).stacked().norm(), 0.0);
+  EXPECT_EQ(none.update(KnownPayload(published), 0, q, P.X, legs, true, 1.0).stacked().norm(), 0.0);
 }
 
 TEST(StaticLoad, GoesThroughTheSensorsFilterByTheShareOnly) {
@@ -225,15 +226,52 @@ TEST(StaticLoad, GoesThroughTheSensorsFilterByTheShareOnly) {
   const Mat3 level = Mat3::Identity(), tilted = rotation({0.3, 0.0, 0.0});
   JointVector q = JointVector::Zero();
   StaticLoad published(puma()), none(config), all(config);
-  for (StaticLoad* load : {&published, &none, &all}) load->update(q, level, false, 0.0);
-  published.update(q, tilted, true, 0.0);
-  none.update(q, tilted, true, 0.0);
-  all.update(q, tilted, true, 1.0);
+  for (StaticLoad* load : {&published, &none, &all})
+    load->update(config.payload, q, level, false, 0.0);
+  published.update(config.payload, q, tilted, true, 0.0);
+  none.update(config.payload, q, tilted, true, 0.0);
+  all.update(config.payload, q, tilted, true, 1.0);
   EXPECT_LT((published.wrench().stacked() - none.wrench().stacked()).norm(), 1e-12);
   EXPECT_GT((published.wrench().f - all.wrench().f).norm(), 1.0);
   EXPECT_EQ(published.counts(), all.counts());  // unfiltered: what the frozen check expects
-  for (int n = 0; n < 200; ++n) all.update(q, tilted, true, 1.0);
+  for (int n = 0; n < 200; ++n) all.update(config.payload, q, tilted, true, 1.0);
   EXPECT_LT((published.wrench().stacked() - all.wrench().stacked()).norm(), 1e-6);
+}
+
+TEST(KnownPayload, IsToldAtItsTimeOfItsSegmentAndOfNothingElse) {
+  ControllerConfig config = puma();
+  const RigidBody box{7.0, Vec3(0.1, 0.0, 0.2), 0.1 * Mat3::Identity()};
+  config.told_loads.size = 2;
+  config.told_loads.loads[0] = {{1, 30'000'000}, 5, box};
+  config.told_loads.loads[1] = {{2, 0}, -1, {}};
+  KnownPayload known(config);
+  const RobotModel empty = config.payload.robot;
+  std::int64_t tick = 100;
+  const auto pass = [&](std::int32_t commanded) {
+    known.update({tick, 0, 0, 0, 0}, commanded);
+    ++tick;
+    return known.payload().robot != empty;
+  };
+  for (const int segment : {-1, 0, 0, 0, 0, 0}) EXPECT_FALSE(pass(segment));
+  // The first command that named segment 1 left a tick before: 30 ms after it are three ticks.
+  EXPECT_FALSE(pass(1));
+  EXPECT_FALSE(pass(1));
+  EXPECT_TRUE(pass(1));
+  EXPECT_TRUE(known.changed());
+  EXPECT_TRUE(pass(1));
+  EXPECT_FALSE(known.changed());
+  const RigidBody both = combine(empty.link(5).body, {}, box);
+  EXPECT_EQ(known.payload().robot.link(5).body, both);
+  EXPECT_EQ(known.carried().link(5).body, both);
+  EXPECT_EQ(known.payload().robot.base, empty.base);
+  EXPECT_FALSE(pass(2));  // released
+  EXPECT_FALSE(pass(-1));
+  // The program once more; late ticks are time too.
+  EXPECT_FALSE(pass(0));
+  EXPECT_FALSE(pass(1));
+  tick += 2;
+  known.update({tick, 0, 2, 2, 0}, 1);
+  EXPECT_EQ(known.payload().robot.link(5).body, both);
 }
 
 // Plans

@@ -72,6 +72,57 @@ TEST(Gate, LetsNothingOutOfRangeIn) {
   EXPECT_TRUE(fromMessage(move));
   move.target = NAN;
   EXPECT_FALSE(fromMessage(move));
+  ToolOrder tool;
+  tool.by = true;
+  tool.in = ToolOrder::Frame::kInertial;
+  tool.position = Vec3(0.1, -0.2, 0.3);
+  tool.via = Vec3(0.0, 0.1, 0.0);
+  tool.speed = 0.1;
+  const auto tool_with = [&](auto change) {
+    robot_command_t m = toMessage(tool, header({1, 2}, 0, 0));
+    change(m);
+    return fromMessage(m);
+  };
+  const auto same = tool_with([](robot_command_t&) {});
+  ASSERT_TRUE(same);
+  const auto& back = std::get<ToolOrder>(*same);
+  EXPECT_TRUE(back.by);
+  EXPECT_EQ(back.in, tool.in);
+  EXPECT_EQ(*back.position, *tool.position);
+  EXPECT_EQ(*back.via, *tool.via);
+  EXPECT_FALSE(back.rpy);
+  EXPECT_EQ(back.speed, 0.1);
+  for (const auto change : std::initializer_list<void (*)(robot_command_t&)>{
+           [](robot_command_t& m) { m.kind = 5; }, [](robot_command_t& m) { m.kind = -1; },
+           [](robot_command_t& m) { m.duration = 1.0; }, [](robot_command_t& m) { m.speed = 0.0; },
+           [](robot_command_t& m) { m.speed = NAN; }, [](robot_command_t& m) { m.speed = -0.1; },
+           [](robot_command_t& m) { m.frame = 3; }, [](robot_command_t& m) { m.frame = -1; },
+           [](robot_command_t& m) { m.parts = 0; }, [](robot_command_t& m) { m.parts = 4; },
+           [](robot_command_t& m) { m.parts = 8; }, [](robot_command_t& m) { m.position[1] = NAN; },
+           [](robot_command_t& m) { m.via[2] = 1e9; }})
+    EXPECT_FALSE(tool_with(change));
+  const RigidBody box{3.0, Vec3(0.0, 0.0, 0.1), Vec3(0.3, 0.2, 0.1).asDiagonal()};
+  const auto load_with = [&](auto change) {
+    robot_command_t m = toMessage(HandOrder{box}, header({1, 2}, 0, 0));
+    change(m);
+    return fromMessage(m);
+  };
+  const auto load = load_with([](robot_command_t&) {});
+  ASSERT_TRUE(load);
+  EXPECT_EQ(std::get<HandOrder>(*load).body_T, box);
+  for (const auto change : std::initializer_list<void (*)(robot_command_t&)>{
+           [](robot_command_t& m) { m.mass = -1.0; }, [](robot_command_t& m) { m.mass = NAN; },
+           [](robot_command_t& m) { m.com[0] = INFINITY; },
+           [](robot_command_t& m) { m.inertia[0] = -0.1; },
+           [](robot_command_t& m) { m.inertia[3] = 0.4; },
+           [](robot_command_t& m) { m.inertia[5] = NAN; },
+           // Every two axes are possible, all three together are not.
+           [](robot_command_t& m) {
+             for (int i = 0; i < 6; ++i) m.inertia[i] = i < 3 ? 1.0 : -0.9;
+           }})
+    EXPECT_FALSE(load_with(change));
+  EXPECT_TRUE(
+      std::holds_alternative<Release>(*fromMessage(toMessage(Release{}, header({1, 2}, 0, 0)))));
   const auto order_with = [](auto change) {
     Order order;
     order.request = Request::kRun;

@@ -13,18 +13,77 @@ namespace {
 
 constexpr Direction kBoth[] = {Direction::kExtending, Direction::kRetracting};
 
-std::vector<RigidBody> programRobots(const ControllerConfig& controller,
-                                     const plant::PlantConfig& plant) {
-  std::vector<RigidBody> out;
-  for (const JointVector& q : programPoses(controller.program, plant))
-    out.push_back(lockedRobot(controller, q));
+std::vector<CarriedRobot> bodies(const ControllerConfig& controller,
+                                 const plant::PlantConfig& plant) {
+  std::vector<CarriedRobot> out;
+  for (const ProgramRobot& one : programRobots(controller, plant)) out.push_back(one.body);
   return out;
 }
+
+/// The robot of a program as its time goes on.
+class ProgramTime {
+ public:
+  ProgramTime(const ControllerConfig& controller, const plant::PlantConfig& plant)
+      : controller_(controller),
+        plant_(plant),
+        robot_(carried(controller.payload), plant.initial_joints),
+        known_(robot_.model()) {}
+
+  /// Everything of a segment, one instant after the other; see(robot) at each.
+  template <class See>
+  void pass(int segment, const See& see) {
+    constexpr int kInstants = 12;     // [-] along each motion
+    std::set<std::int64_t> instants;  // [ns]
+    std::vector<plant::RobotEvent> events;
+    for (const plant::RobotEvent& event : plant_.robot_events) {
+      if (event.cue.segment != segment) continue;
+      events.push_back(event);
+      const double duration = durationOf(event.action);
+      for (int k = 0; k <= kInstants; ++k)
+        instants.insert(event.cue.after + std::llround(duration * 1e9 * k / kInstants));
+    }
+    std::vector<ToldLoad> told;
+    for (int i = 0; i < controller_.told_loads.size; ++i) {
+      const ToldLoad& load = controller_.told_loads.loads[static_cast<std::size_t>(i)];
+      if (load.cue.segment != segment) continue;
+      told.push_back(load);
+      instants.insert(load.cue.after);
+    }
+    std::stable_sort(events.begin(), events.end(),
+                     [](const auto& a, const auto& b) { return a.cue.after < b.cue.after; });
+    auto next = events.begin();
+    auto next_told = told.begin();
+    for (const std::int64_t now : instants) {
+      for (; next != events.end() && next->cue.after <= now; ++next)
+        robot_.begin(next->action, origin_ + next->cue.after);
+      for (; next_told != told.end() && next_told->cue.after <= now; ++next_told)
+        known_ = withLoad(carried(controller_.payload), next_told->link, next_told->body);
+      see(look(now));
+    }
+    if (!instants.empty()) origin_ += *instants.rbegin();  // all has come to rest
+  }
+
+  /// `now` [ns] of the segment.
+  ProgramRobot look(std::int64_t now = 0) const {
+    const JointVector q = robot_.at(origin_ + now).q;
+    const auto locked = [&](const RobotModel& robot) {
+      return combine(RigidBody{}, controller_.payload.X_PL0(), compositeBody(robot, q));
+    };
+    return {q, {locked(robot_.model()), locked(known_)}};
+  }
+
+ private:
+  const ControllerConfig& controller_;
+  const plant::PlantConfig& plant_;
+  MovingRobot robot_;
+  RobotModel known_;
+  std::int64_t origin_ = 0;  // [ns] start of the segment
+};
 
 /// True when the `change`d loop decays with every robot and in both directions.
 template <class Change>
 bool holds(const ControllerConfig& controller, const plant::PlantConfig& plant,
-           const std::vector<RigidBody>& robots, const Change& change) {
+           const std::vector<CarriedRobot>& robots, const Change& change) {
   return std::all_of(std::begin(kBoth), std::end(kBoth), [&](Direction direction) {
     Loop loop = loopOf(controller, plant, plant.initial_joints, direction);
     change(loop);
@@ -34,47 +93,34 @@ bool holds(const ControllerConfig& controller, const plant::PlantConfig& plant,
 
 }  // namespace
 
-std::vector<JointVector> programPoses(const Program& program, const plant::PlantConfig& plant) {
-  constexpr int kInstants = 12;  // [-] along each motion
+std::vector<ProgramRobot> programRobots(const ControllerConfig& controller,
+                                        const plant::PlantConfig& plant) {
+  const Program& program = controller.program;
   const auto felt = [&](int i) {
     return i < program.size &&
            program.segments[static_cast<std::size_t>(i)].kind == SegmentKind::kAdmittance;
   };
-  std::vector<JointVector> out = {plant.initial_joints};
-  JointVector at = plant.initial_joints;
+  ProgramTime time(controller, plant);
+  std::vector<ProgramRobot> out = {time.look()};
   for (int i = 0; i < program.size; ++i) {
-    if (felt(i) && at != out.back()) out.push_back(at);
-    std::vector<plant::RobotEvent> events;
-    std::set<std::int64_t> instants;  // [ns]
-    for (const plant::RobotEvent& event : plant.robot_events) {
-      if (event.cue.segment != i) continue;
-      events.push_back(event);
-      for (int k = 0; k <= kInstants; ++k)
-        instants.insert(event.cue.after + std::llround(event.move.duration * 1e9 * k / kInstants));
-    }
-    std::stable_sort(events.begin(), events.end(),
-                     [](const auto& a, const auto& b) { return a.cue.after < b.cue.after; });
-    JointPaths paths(kMaxJoints, at);
-    auto next = events.begin();
-    for (const std::int64_t now : instants) {
-      for (; next != events.end() && next->cue.after <= now; ++next)
-        paths.move(next->move, next->cue.after);
-      at = paths.at(now).q;
-      if (felt(i) || felt(i + 1)) out.push_back(at);  // a motion may outlast its segment
-    }
+    const ProgramRobot begins = time.look();
+    if (felt(i) && begins != out.back()) out.push_back(begins);
+    time.pass(i, [&](const ProgramRobot& robot) {
+      if (felt(i) || felt(i + 1)) out.push_back(robot);  // a motion may outlast its segment
+    });
   }
   return out;
 }
 
 bool isStable(const ControllerConfig& controller, const plant::PlantConfig& plant) {
-  return holds(controller, plant, programRobots(controller, plant), [](Loop&) {});
+  return holds(controller, plant, bodies(controller, plant), [](Loop&) {});
 }
 
 LoopVerdict assessStability(const ControllerConfig& controller, const plant::PlantConfig& plant) {
   LoopVerdict out;
   out.modes = static_cast<int>(controller.admittance.stiffness.size());
   out.stable_modes = out.modes;
-  const std::vector<RigidBody> robots = programRobots(controller, plant);
+  const std::vector<CarriedRobot> robots = bodies(controller, plant);
   const auto cured = [&](const auto& change) { return holds(controller, plant, robots, change); };
   out.stable = cured([](Loop&) {});
   double largest = 0.0;
@@ -82,8 +128,8 @@ LoopVerdict assessStability(const ControllerConfig& controller, const plant::Pla
     double most = 0.0;
     Loop& kept = direction == Direction::kExtending ? out.extending : out.retracting;
     const Loop loop = loopOf(controller, plant, plant.initial_joints, direction);
-    for (const RigidBody& robot_P : robots) {
-      const Loop with = carrying(loop, robot_P);
+    for (const CarriedRobot& robot : robots) {
+      const Loop with = carrying(loop, robot);
       const double r = radius(with);
       if (r <= most) continue;
       most = r;

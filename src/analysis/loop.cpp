@@ -288,17 +288,18 @@ Loop loopOf(const ControllerConfig& controller, const plant::PlantConfig& p, con
   return loop;
 }
 
-Loop carrying(Loop loop, const RigidBody& robot_P) {
-  loop.robot_P = loop.model.robot_P = robot_P;
+Loop carrying(Loop loop, const CarriedRobot& robot) {
+  loop.robot_P = robot.robot_P;
+  loop.model.robot_P = robot.known_P;
   return loop;
 }
 
 bool decays(const Loop& loop) { return decays(loop, liftedOf(loop)); }
 
-bool decaysWithAll(const Loop& loop, const std::vector<RigidBody>& robots) {
+bool decaysWithAll(const Loop& loop, const std::vector<CarriedRobot>& robots) {
   const Lifted lifted = liftedOf(loop);
-  return std::all_of(robots.begin(), robots.end(), [&](const RigidBody& robot_P) {
-    return decays(carrying(loop, robot_P), lifted);
+  return std::all_of(robots.begin(), robots.end(), [&](const CarriedRobot& robot) {
+    return decays(carrying(loop, robot), lifted);
   });
 }
 

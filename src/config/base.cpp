@@ -103,26 +103,6 @@ ModalModel readTable(Section s) {
   return out;
 }
 
-/// The symmetric matrix of {xx, yy, zz, xy, xz, yz}, that a body can have.
-Mat3 readInertia(Section& s, std::string_view key) {
-  const Eigen::VectorXd i = s.vector(key, 6, -1e7, 1e7);
-  Mat3 I;
-  I << i(0), i(3), i(4), i(3), i(1), i(5), i(4), i(5), i(2);
-  const double least = symmetricEigenvalues(I)(0);
-  if (!(least >= -1e-9 * I.norm()))
-    s.fail(key, fmt::format("smallest principal moment {:.4g}, want none below 0", least));
-  return I;
-}
-
-RigidBody readBody(Section s) {
-  RigidBody body;
-  body.mass = s.number("mass_kg", 0.0, 1e6);
-  if (s.has("center_m")) body.p_BoBcm_B = s.vector("center_m", 3, -100.0, 100.0);
-  body.I_Bcm_B = readInertia(s, "inertia_kg_m2");
-  s.finish();
-  return body;
-}
-
 ArmJoint readJoint(Section s, Section& pose) {
   ArmJoint joint;
   joint.name = s.text("name");

@@ -35,22 +35,32 @@ std::string setupOf(const Value& document) {
   return fingerprint(text);
 }
 
+/// [ns] at which an action that begins `now` is over.
+std::int64_t endOf(MovingRobot& robot, const RobotAction& action, std::int64_t now) {
+  robot.begin(action, now);
+  return now + std::llround(durationOf(action) * 1e9);
+}
+
 /// Warns of channels that the weight alone nearly fills, in the robot's poses and level.
 void warnOfFullChannels(Experiment& e) {
   constexpr double kMostShare = 0.9, kFullScale = 32767.0;  // [-], [count]
   const Mat6 S_proc = e.plant.sensor.S_proc();
-  std::vector<JointVector> poses = {e.plant.initial_joints};
-  for (const plant::RobotEvent& event : e.plant.robot_events) {
-    poses.push_back(poses.back());
-    poses.back()(event.move.joint) = event.move.target;
-  }
   Vec6 most = Vec6::Zero();
   const Mat3 R = e.plant.geometry.fromHome(e.plant.initial_pose).R;
-  for (const JointVector& q : poses)
+  const auto look = [&](const RobotModel& robot, const JointVector& q) {
+    Payload payload = e.plant.payload;
+    payload.robot = robot;
     for (const Mat3& attitude : {Mat3(Mat3::Identity()), R})
       most = most.cwiseMax(
-          (S_proc * staticWrench(e.plant.payload, q, attitude, e.plant.gravity).stacked())
-              .cwiseAbs());
+          (S_proc * staticWrench(payload, q, attitude, e.plant.gravity).stacked()).cwiseAbs());
+  };
+  MovingRobot robot(e.plant.payload.robot, e.plant.initial_joints);
+  std::int64_t now = 0;
+  look(robot.model(), robot.at(now).q);
+  for (const plant::RobotEvent& event : e.plant.robot_events) {
+    now = endOf(robot, event.action, now);
+    look(robot.model(), robot.at(now).q);
+  }
   for (int i = 0; i < 6; ++i)
     if (most(i) > kMostShare * kFullScale)
       e.warnings.push_back(fmt::format(
@@ -97,19 +107,16 @@ Experiment build(const Value& document) {
   c.payload.X_PS = sensor.X_PS;
   c.payload.top_plate_S = sensor.top_plate_S;
   c.payload.X_PR.p = sensor.X_PS.p;
-  UrdfRobot urdf;
-  const bool has_robot = root.has("robot");
-  if (has_robot) {
+  if (root.has("robot")) {
     const Robot robot = readRobot(root.section("robot"), document);
-    urdf = robot.urdf;
+    out.robot = robot.urdf;
     c.payload.X_PR = robot.X_PR;
     c.payload.adapter_R = robot.adapter_R;
     c.payload.X_RL0 = robot.X_RL0;
-    c.payload.robot = urdf.model;
+    c.payload.robot = out.robot.model;
     p.initial_joints = robot.q;
-    out.joint_names = urdf.joint_names;
-    out.notes = urdf.warnings;
-    if (!urdf.choice.empty()) out.warnings.push_back(urdf.choice);
+    out.notes = out.robot.warnings;
+    if (!out.robot.choice.empty()) out.warnings.push_back(out.robot.choice);
   }
 
   p.geometry = c.geometry;
@@ -158,7 +165,7 @@ Experiment build(const Value& document) {
     c.payload = withMasses(c.payload, masses);
   }
 
-  readProgram(root, has_robot ? &urdf : nullptr, out);
+  readProgram(root, out);
   root.finish();
   warnOfFullChannels(out);
   out.substitutes = countSubstitutes(document, false);
@@ -220,13 +227,20 @@ Interaction interactionOf(const Experiment& experiment, std::int64_t& duration) 
   Interaction out;
   out.base = experiment.controller.admittance;
   out.payload = experiment.plant.payload;
-  out.q0 = experiment.plant.initial_joints;
+  MovingRobot before(out.payload.robot, experiment.plant.initial_joints);
+  std::int64_t now = 0;
+  RobotAction in_hand = Release{};
   for (const plant::RobotEvent& event : experiment.plant.robot_events) {
-    if (event.cue.segment < segment) out.q0(event.move.joint) = event.move.target;
-    if (event.cue.segment == segment) out.moves.push_back({event.cue.after, event.move});
+    if (event.cue.segment > segment) break;
+    if (event.cue.segment == segment) {
+      out.actions.push_back({event.cue.after, event.action});
+      continue;
+    }
+    now = endOf(before, event.action, now);
+    if (std::holds_alternative<Grasp>(event.action)) in_hand = event.action;
   }
-  std::stable_sort(out.moves.begin(), out.moves.end(),
-                   [](const TimedMove& a, const TimedMove& b) { return a.start < b.start; });
+  if (before.holds()) out.actions.insert(out.actions.begin(), {0, in_hand});
+  out.q0 = before.at(now).q;
   return out;
 }
 

@@ -4,8 +4,23 @@
 #include <fmt/format.h>
 
 #include "ves/base/coordinates.hpp"
+#include "ves/math/dense.hpp"
 
 namespace ves {
+namespace {
+
+/// The symmetric matrix of {xx, yy, zz, xy, xz, yz}, that a body can have.
+Mat3 readInertia(Section& s, std::string_view key) {
+  const Eigen::VectorXd i = s.vector(key, 6, -1e7, 1e7);
+  Mat3 I;
+  I << i(0), i(3), i(4), i(3), i(1), i(5), i(4), i(5), i(2);
+  const double least = symmetricEigenvalues(I)(0);
+  if (!(least >= -1e-9 * I.norm()))
+    s.fail(key, fmt::format("smallest principal moment {:.4g}, want none below 0", least));
+  return I;
+}
+
+}  // namespace
 
 /// A length in metres, or an angle in degrees, by coordinate.
 double readCoordinate(Section& s, const std::string& key, int i) {
@@ -26,6 +41,15 @@ Pose readPose(Section s) {
 
 std::int64_t readTime(Section& s, std::string_view key) {
   return std::llround(s.number(key, 0.0, 1e6) * 1e9);
+}
+
+RigidBody readBody(Section s) {
+  RigidBody body;
+  body.mass = s.number("mass_kg", 0.0, 1e6);
+  if (s.has("center_m")) body.p_BoBcm_B = s.vector("center_m", 3, -100.0, 100.0);
+  body.I_Bcm_B = readInertia(s, "inertia_kg_m2");
+  s.finish();
+  return body;
 }
 
 RigidBody readBox(Section s) {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "readers.hpp"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
 
+#include "readers.hpp"
+#include "robot_events.hpp"
 #include "ves/base/coordinates.hpp"
 
 namespace ves {
@@ -13,7 +13,7 @@ namespace {
 
 class ProgramReader {
  public:
-  ProgramReader(const UrdfRobot* robot, Experiment& out) : robot_(robot), out_(out) {}
+  explicit ProgramReader(Experiment& out) : out_(out), robot_(out) {}
 
   void read(Section& root) {
     const std::vector<Section> items = root.list("program");
@@ -24,11 +24,11 @@ class ProgramReader {
       Segment& segment =
           out_.controller.program.segments[static_cast<std::size_t>(out_.controller.program.size)];
       readSegment(item, segment);
-      if (item.has("robot"))
-        for (Section event : item.list("robot")) readRobotEvent(event);
+      if (item.has("robot")) readRobotEvents(item);
       if (item.has("faults"))
         for (Section event : item.list("faults")) readFault(event);
       item.finish();
+      robot_.pass(segment);
       ++out_.controller.program.size;
     }
   }
@@ -93,22 +93,15 @@ class ProgramReader {
     return axis;
   }
 
-  void readRobotEvent(Section& s) {
-    plant::RobotEvent event;
-    event.cue = {out_.controller.program.size, readTime(s, "at_s")};
-    event.move.duration = s.number("duration_s", 1e-3, 1e5);
-    const std::string joint = s.text("joint");
-    if (!robot_) s.fail("joint", fmt::format("'{}', but there is no robot", joint));
-    const auto at = std::find(robot_->joint_names.begin(), robot_->joint_names.end(), joint);
-    if (at == robot_->joint_names.end())
-      s.fail("joint",
-             fmt::format("'{}', want one of {}", joint, fmt::join(robot_->joint_names, ", ")));
-    event.move.joint = static_cast<int>(at - robot_->joint_names.begin());
-    event.move.target = s.number("to_deg_or_m", -1e6, 1e6) *
-                        jointUnit(robot_->model.jointLink(event.move.joint).type);
-    requireInLimits(s, "to_deg_or_m", *robot_, event.move.joint, event.move.target);
-    s.finish();
-    out_.plant.robot_events.push_back(event);
+  void readRobotEvents(Section& item) {
+    std::vector<std::pair<std::int64_t, Section>> events;  // [ns] when
+    for (Section event : item.list("robot")) {
+      const std::int64_t at = readTime(event, "at_s");
+      events.emplace_back(at, event);
+    }
+    std::stable_sort(events.begin(), events.end(),
+                     [](const auto& a, const auto& b) { return a.first < b.first; });
+    for (auto& [at, event] : events) robot_.read(event, {out_.controller.program.size, at});
   }
 
   void readFault(Section& s) {
@@ -142,14 +135,12 @@ class ProgramReader {
     out_.plant.faults.push_back(event);
   }
 
-  const UrdfRobot* robot_;
   Experiment& out_;
+  RobotEvents robot_;
 };
 
 }  // namespace
 
-void readProgram(Section& root, const UrdfRobot* robot, Experiment& out) {
-  ProgramReader(robot, out).read(root);
-}
+void readProgram(Section& root, Experiment& out) { ProgramReader(out).read(root); }
 
 }  // namespace ves

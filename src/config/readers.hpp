@@ -20,6 +20,8 @@ double readCoordinate(Section& s, const std::string& key, int i);
 Pose readPose(Section s);
 /// Nanoseconds from seconds, to the nearest.
 std::int64_t readTime(Section& s, std::string_view key);
+/// mass_kg, center_m, inertia_kg_m2
+RigidBody readBody(Section s);
 /// A uniform box; its centre is at the frame's origin unless `center_m` says otherwise.
 RigidBody readBox(Section s);
 
@@ -64,8 +66,8 @@ void requireInLimits(const Section& s, std::string_view key, const UrdfRobot& ro
 /// controller, into `c`
 void readController(Section s, ControllerConfig& c);
 
-/// program, with the events of robot and faults; `robot` is null where there is none
-void readProgram(Section& root, const UrdfRobot* robot, Experiment& out);
+/// program, with the events of robot and faults; `out` has the machine and the robot already
+void readProgram(Section& root, Experiment& out);
 
 /// plant_mismatch
 void readPlantMismatch(Section s, plant::PlantConfig& p);

@@ -22,6 +22,21 @@ void requireInLimits(const Section& s, std::string_view key, const UrdfRobot& ro
                             link.lower / unit, link.upper / unit, jointUnitName(link.type)));
 }
 
+/// [-] of the robot's frames: the tip, or the only frame that carries no other; -1: none.
+static int tipOf(const UrdfRobot& robot, const std::string& tip) {
+  std::vector<bool> carries(robot.frames.size());
+  for (const NamedFrame& f : robot.frames)
+    if (f.parent >= 0) carries[static_cast<std::size_t>(f.parent)] = true;
+  int end = -1;
+  for (int i = 0; i < static_cast<int>(robot.frames.size()); ++i) {
+    if (robot.frames[static_cast<std::size_t>(i)].name == tip) return i;
+    if (carries[static_cast<std::size_t>(i)]) continue;
+    if (tip.empty() && end >= 0) return -1;
+    end = i;
+  }
+  return end;
+}
+
 UrdfRobot chosenRobot(Section& s, const UrdfTree& tree) {
   const auto own = [&](std::string_view key, const std::string& name) -> const UrdfTree::Joint& {
     const UrdfTree::Joint* joint = tree.find(name);
@@ -69,6 +84,7 @@ UrdfRobot chosenRobot(Section& s, const UrdfTree& tree) {
                        moving.size(), kMaxJoints));
   UrdfRobot out = tree.robot(moving, held);
   const bool chosen = s.has("tip") || s.has("joints") || s.has("lock");
+  out.tip = tipOf(out, s.has("tip") ? s.text("tip") : "");
   bool serial = true;
   for (int i = 0; i < out.model.size; ++i)
     serial = serial && out.model.link(i).parent == i - 1 && out.model.link(i).joint == i;

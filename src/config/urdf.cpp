@@ -92,8 +92,13 @@ class UrdfTree::Impl {
     };
     std::map<const urdf::Link*, Carried> carried;
     std::map<const urdf::Link*, int> frames;  // index of its own
-    for (const Joint& joint : joints_)
-      if (joint.follows.empty() && moving.count(joint.name)) out.joint_names.push_back(joint.name);
+    out.fastest.setConstant(HUGE_VAL);
+    for (const Joint& joint : joints_) {
+      if (!joint.follows.empty() || !moving.count(joint.name)) continue;
+      const auto i = std::ssize(out.joint_names);
+      if (i < kMaxJoints) out.fastest(i) = joint.fastest;
+      out.joint_names.push_back(joint.name);
+    }
     for (const urdf::Link* link : links_) {
       Carried here;
       bool moves = false;
@@ -121,8 +126,7 @@ class UrdfTree::Impl {
       out.frames.push_back(
           {link->name, parent, here.link, here.X, moves ? link->parent_joint->name : ""});
       carried[link] = here;
-      RigidBody& carrier =
-          here.link < 0 ? model.base : model.links[static_cast<std::size_t>(here.link)].body;
+      RigidBody& carrier = model.bodyOf(here.link);
       if (!link->inertial) {
         if (moves)
           out.warnings.push_back(fmt::format("{}:{}: link '{}' moves and has no mass", file_,
@@ -193,6 +197,8 @@ class UrdfTree::Impl {
       refuse("joint", joint.name, "its axis has no direction");
     own.lower = -HUGE_VAL;
     own.upper = HUGE_VAL;
+    // Zero stands for a speed that nobody has filled in.
+    if (joint.limits && joint.limits->velocity > 0.0) own.fastest = joint.limits->velocity;
     if (joint.limits && joint.type != urdf::Joint::CONTINUOUS) {
       own.lower = joint.limits->lower;
       own.upper = joint.limits->upper;

@@ -108,7 +108,7 @@ Segment move(Words& words, const SafetyLimits& limits) {
 }
 
 RobotMove robotMove(Words& words, const Experiment& experiment) {
-  const std::vector<std::string>& names = experiment.joint_names;
+  const std::vector<std::string>& names = experiment.robot.joint_names;
   const std::string joint = words.word("joint");
   const auto at = std::find(names.begin(), names.end(), joint);
   if (at == names.end())
@@ -124,6 +124,43 @@ RobotMove robotMove(Words& words, const Experiment& experiment) {
       words.number(joint, link.lower / unit, link.upper / unit, turns ? "deg" : "mm") * unit;
   move.duration = words.seconds("seconds", 0.1);
   return move;
+}
+
+void needTool(const Experiment& experiment) {
+  if (!experiment.robot.tool()) throw InputError("there is no robot with one tip");
+}
+
+Vec3 place(Words& words) {
+  constexpr double kFar = 1e5;  // [mm]
+  Vec3 p;
+  for (int i = 0; i < 3; ++i)
+    p(i) = words.number(std::string(coordinate(i).name), -kFar, kFar, "mm") * kMillimetre;
+  return p;
+}
+
+ToolOrder toolPath(Words& words, const Experiment& experiment) {
+  needTool(experiment);
+  ToolOrder order;
+  const std::string how = words.word("to or by");
+  if (how != "to" && how != "by") throw InputError(fmt::format("'{}', want to or by", how));
+  order.by = how == "by";
+  order.position = place(words);
+  order.duration = words.number("seconds", 0.1, 1e4, "s");
+  if (words.empty()) return order;
+  const std::string frame = words.word("frame");
+  const auto at = std::find(std::begin(kToolFrameNames), std::end(kToolFrameNames), frame);
+  if (at == std::end(kToolFrameNames))
+    throw InputError(fmt::format("'{}', want one of {}", frame, fmt::join(kToolFrameNames, ", ")));
+  order.in = static_cast<ToolOrder::Frame>(at - std::begin(kToolFrameNames));
+  return order;
+}
+
+HandOrder load(Words& words, const Experiment& experiment) {
+  needTool(experiment);
+  HandOrder order;
+  order.body_T.mass = words.number("kg", 0.0, 1e6, "kg");
+  if (!words.empty()) order.body_T.p_BoBcm_B = place(words);
+  return order;
 }
 
 Collection collection(Words& words) {
@@ -159,6 +196,10 @@ const std::vector<Item>& menu() {
       {Verb::kCalibration, "calibration", "", "the sensor's bias, from 100 samples at rest"},
       {Verb::kTare, "tare", "", "subtract the wrench that is measured now"},
       {Verb::kRobot, "robot", "JOINT TO SECONDS", "move a joint of the simulated robot"},
+      {Verb::kTool, "tool", "to|by X Y Z SECONDS [FRAME]",
+       "lead its tool straight there (robot, platform, inertial)"},
+      {Verb::kGrasp, "grasp", "KG [X Y Z]", "a load in the tool, its centre there"},
+      {Verb::kRelease, "release", "", "let go of it"},
       {Verb::kCollect, "collect", "FILE [SECONDS [HZ [NAME...]]]", "variables to a CSV file"},
       {Verb::kStatus, "status", "", "where everything is"},
       {Verb::kHold, "hold", "", "brake and stay"},
@@ -223,6 +264,9 @@ Command parseCommand(const std::string& line, const Experiment& experiment) {
     case Verb::kUncompensate: order.request = Request::kUncompensate; break;
     case Verb::kQuit: order.request = Request::kStop; break;
     case Verb::kRobot: command.robot = robotMove(words, experiment); break;
+    case Verb::kTool: command.robot = toolPath(words, experiment); break;
+    case Verb::kGrasp: command.robot = load(words, experiment); break;
+    case Verb::kRelease: command.robot = Release{}; break;
     case Verb::kCollect: command.collection = collection(words); break;
     case Verb::kWait: command.wait = words.seconds(); break;
     case Verb::kStatus:

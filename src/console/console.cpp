@@ -15,6 +15,7 @@
 #include "ves/console/command.hpp"
 #include "ves/console/form.hpp"
 #include "ves/realtime/realtime.hpp"
+#include "ves/results/evidence.hpp"
 #include "ves/results/series.hpp"
 #include "ves/run/session.hpp"
 #include "ves/transport/channels.hpp"
@@ -115,8 +116,7 @@ class Console {
       if (status == Calibration::Status::kDone) keepCalibration(s);
       if (status == Calibration::Status::kRefused) {
         failed_ = failed_ || !script_.empty();
-        say(fmt::format("calibration refused: {}; the bias is as before",
-                        evidence(s, experiment_)));
+        say(fmt::format("calibration refused: {}; the bias is as before", stirred(s, experiment_)));
       }
     }
   }
@@ -211,7 +211,10 @@ class Console {
         while (monotonicNow() < until && !over()) session_->listen(kTurn);
         break;
       }
-      case Verb::kRobot: session_->moveRobot(command.robot); break;
+      case Verb::kRobot:
+      case Verb::kTool:
+      case Verb::kGrasp:
+      case Verb::kRelease: session_->orderRobot(command.robot); break;
       case Verb::kQuit: return false;
       default: return give(command);
     }

@@ -35,6 +35,13 @@ class Form {
         }
         break;
       case Verb::kRobot: robot(); break;
+      case Verb::kTool:
+        add("to a place, or by a way", "by");
+        for (const char* axis : {"x", "y", "z"}) add(axis, "0", between(-1e5, 1e5, "mm"));
+        add("seconds", "5", kSeconds);
+        add(fmt::format("axes of, one of {}", fmt::join(kToolFrameNames, " ")), "robot");
+        break;
+      case Verb::kGrasp: add("kg", "1", between(0.0, 1e6, "kg")); break;
       case Verb::kCollect:
         add("file", "collected.csv");
         add("seconds", "10", kSeconds);
@@ -69,7 +76,7 @@ class Form {
   }
 
   void robot() {
-    const auto& names = experiment_.joint_names;
+    const auto& names = experiment_.robot.joint_names;
     add(fmt::format("joint, one of {}", fmt::join(names, " ")), names.empty() ? "none" : names[0]);
     add("to, deg or mm", "0", between(-1e4, 1e4, "deg or mm"));
     add("seconds", "5", kSeconds);

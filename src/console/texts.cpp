@@ -19,36 +19,6 @@ std::string poseText(const double (&x)[6]) {
 
 std::string failing(std::int32_t bits) { return names(Tripped(static_cast<std::uint32_t>(bits))); }
 
-std::string evidence(const state_t& s, const Experiment& experiment) {
-  const auto i = static_cast<std::size_t>(s.violation_index);
-  const StillnessLimits& limits = experiment.controller.stillness;
-  const std::string channel(i < 6 ? kWrenchComponents[i].name : "a channel");
-  switch (static_cast<StillnessViolation>(s.violation)) {
-    case StillnessViolation::kLeg:
-      return fmt::format("leg {} moved by {} counts ({} allowed)", i + 1, s.violation_amount,
-                         limits.leg_counts);
-    case StillnessViolation::kJoint: {
-      const bool known = i < experiment.joint_names.size();
-      const bool turns =
-          known && experiment.controller.payload.robot.jointLink(s.violation_index).type ==
-                       JointType::kRevolute;
-      return fmt::format("{} moved by {:.4f} {} ({} allowed)",
-                         known ? experiment.joint_names[i] : fmt::format("joint {}", i + 1),
-                         s.violation_amount, turns ? "rad" : "m", limits.joint);
-    }
-    case StillnessViolation::kChannel:
-      return fmt::format("{} scatters by {:.1f} counts ({} allowed): something shakes it", channel,
-                         s.violation_amount, limits.deviation);
-    case StillnessViolation::kBias:
-      return fmt::format(
-          "{} would have a bias of {:.0f} counts ({:.0f} allowed): it carries a load that is not "
-          "in the model, or less than that",
-          channel, s.violation_amount, limits.bias);
-    case StillnessViolation::kNone: break;
-  }
-  return "no stream of new samples";
-}
-
 std::string statusText(const Status& status) {
   const state_t& s = status.state;
   const auto kind = static_cast<SegmentKind>(s.kind);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// What the menu says of a state: pose, failing checks, why a calibration was refused, the status.
+// What the menu says of a state: pose, failing checks, the status.
 #pragma once
 
 #include <optional>
@@ -17,8 +17,6 @@ std::string poseText(const double (&x)[6]);
 std::string coordinateText(int i, double x);
 /// The names of the checks in a state's bits.
 std::string failing(std::int32_t bits);
-/// What moved, or was out of range, while a calibration took its samples.
-std::string evidence(const state_t& state, const Experiment& experiment);
 
 struct Status {
   const state_t& state;

@@ -7,17 +7,45 @@
 
 namespace ves {
 
+KnownPayload::KnownPayload(const ControllerConfig& config)
+    : empty_(config.payload.robot),
+      told_(config.told_loads),
+      period_(config.period),
+      payload_(config.payload),
+      carried_(ves::carried(config.payload)) {}
+
+void KnownPayload::update(const Elapsed& elapsed, std::int32_t commanded) noexcept {
+  changed_ = false;
+  if (commanded != segment_) {
+    if (commanded < segment_) done_.fill(false);  // a program begins anew
+    segment_ = commanded;
+    began_ = elapsed.tick - elapsed.between - 1;
+  }
+  const std::int64_t since = (elapsed.tick - began_) * period_;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(told_.size); ++i) {
+    const Cue& cue = told_.loads[i].cue;
+    if (done_[i] || cue.segment != segment_ || since < cue.after) continue;
+    done_[i] = true;
+    take(told_.loads[i]);
+  }
+}
+
+void KnownPayload::take(const ToldLoad& load) noexcept {
+  payload_.robot = withLoad(empty_, load.link, load.body);
+  carried_ = ves::carried(payload_);
+  changed_ = true;
+}
+
 StaticLoad::StaticLoad(const ControllerConfig& config)
-    : payload_(config.payload),
-      gravity_(config.gravity),
+    : gravity_(config.gravity),
       S_proc_(config.sensor.C_proc.inverse()),
       filters_(config.compensation.inertia),
       filter_(config.servo.sensor_cutoff),
       filter_step_(filter_.prepare(config.periodSeconds())) {}
 
-void StaticLoad::update(const JointVector& q, const Mat3& R_IP, bool engaged,
-                        double share) noexcept {
-  F_So_S_ = staticWrench(payload_, q, R_IP, gravity_);
+void StaticLoad::update(const Payload& payload, const JointVector& q, const Mat3& R_IP,
+                        bool engaged, double share) noexcept {
+  F_So_S_ = staticWrench(payload, q, R_IP, gravity_);
   const Vec6 weight = F_So_S_.stacked();
   counts_ = S_proc_ * weight;
   if (!filters_ || !weight.allFinite()) return;
@@ -31,15 +59,14 @@ void StaticLoad::update(const JointVector& q, const Mat3& R_IP, bool engaged,
 RobotInertia::RobotInertia(const ControllerConfig& config)
     : compensated_(config.compensation.inertia),
       mass_update_(config.compensation.mass_update),
-      geometry_(config.geometry),
-      carried_(carried(config.payload)),
-      X_PL0_(config.payload.X_PL0()) {}
+      geometry_(config.geometry) {}
 
-Wrench RobotInertia::update(std::int64_t count, const JointVector& q, const Transform& X_IP,
-                            const LegMotion& legs, bool engaged, double share) noexcept {
+Wrench RobotInertia::update(const KnownPayload& known, std::int64_t count, const JointVector& q,
+                            const Transform& X_IP, const LegMotion& legs, bool engaged,
+                            double share) noexcept {
   if (!compensated_ || !engaged) return {};
-  if (count % mass_update_ == 0)
-    composite_P_ = combine(RigidBody{}, X_PL0_, compositeBody(carried_, q));
+  if (count % mass_update_ == 0 || known.changed())
+    composite_P_ = combine(RigidBody{}, known.payload().X_PL0(), compositeBody(known.carried(), q));
   M_1_ = share * spatialMass(rotated(X_IP.R, composite_P_));
   BodyMotion P;
   if (!forwardMotion(geometry_, X_IP, legs, P)) return {};

@@ -23,6 +23,7 @@ TestPlatform::TestPlatform(const ControllerConfig& config)
       period_(config.periodSeconds()),
       share_(config.compensation, period_),
       legs_(config),
+      known_(config),
       load_(config),
       bias_(config),
       robot_(config),
@@ -39,15 +40,16 @@ const TickState& TestPlatform::tick(const TickInput& in) noexcept {
   const Sample& sample = samples_.sample();
   const Transform& X_IP = legs_.update(samples_, elapsed, following, commander_).X_IP;  // (2.23)
 
-  load_.update(sample.q, X_IP.R, engaged, share_.value());
+  known_.update(elapsed, commander_.command().segment);
+  load_.update(known_.payload(), sample.q, X_IP.R, engaged, share_.value());
   bias_.stepTare(sample, samples_.fresh(), load_.counts());
   // The measured attitude: the commanded one leads it by the servo's lag, and the difference would
   // pass as a wrench of the robot's weight.
   Wrenches W;
   W.total = forceMeasurement(config_.sensor, bias_.counts(), sample.adc, X_IP.R);  // (C.1)
   W.static_wrench = gravityCompensation(config_.payload, X_IP.R, load_.wrench());  // (B.4)
-  W.inertial =
-      robot_.update(elapsed.count, sample.q, X_IP, legs_.filteredMotion(), engaged, share_.value());
+  W.inertial = robot_.update(known_, elapsed.count, sample.q, X_IP, legs_.filteredMotion(), engaged,
+                             share_.value());
   W.dynamic = W.total - W.static_wrench + W.inertial;
   safety_.watch(elapsed, samples_, load_.counts());
 

@@ -137,8 +137,8 @@ SoakResult soak(const std::filesystem::path& config, std::int64_t ticks, std::ui
     before = s.phase;
     loop.input.order = drawOrder(s.phase, dice);
     if (s.phase == Phase::kRunning && dice.chance(0.005))
-      loop.plant().moveRobot(
-          {dice.pick(6), 0.5 * (dice.pick(2001) - 1000) * 1e-3, 0.5 + 0.01 * dice.pick(300)});
+      loop.plant().moveRobot(RobotMove{dice.pick(6), 0.5 * (dice.pick(2001) - 1000) * 1e-3,
+                                       0.5 + 0.01 * dice.pick(300)});
 
     if (const std::string law = laws.broken(s.command); !law.empty())
       out.violated = fmt::format("tick {}: {}", s.tick, law);

@@ -41,7 +41,7 @@ std::string scenarioOf(const PosePlan& plan, const Experiment& experiment, const
       const double unit = jointUnit(robot.jointLink(i).type);
       text += fmt::format("{}{{at_s: {:.2f}, duration_s: {:.2f}, joint: {}, to_deg_or_m: {:.6g}}}",
                           text.empty() ? "" : ",\n             ", start, time,
-                          experiment.joint_names[static_cast<std::size_t>(i)], to(i) / unit);
+                          experiment.robot.joint_names[static_cast<std::size_t>(i)], to(i) / unit);
     }
     return text.empty() ? text : fmt::format("    robot: [{}]\n", text);
   };

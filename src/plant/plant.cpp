@@ -17,7 +17,6 @@ constexpr std::int64_t kSettle = 100'000'000;           // [ns] between checks w
 
 Plant::Plant(const PlantConfig& config)
     : config_(config),
-      carried_(carried(config.payload)),
       sensor_(config.sensor, Noise(config.seed)),
       filter_position_(config.filter_cutoff),
       filter_velocity_(config.filter_cutoff),
@@ -26,7 +25,7 @@ Plant::Plant(const PlantConfig& config)
       position_step_(filter_position_.prepare(seconds(kUpdatePeriod))),
       rate_step_(filter_velocity_.prepare(seconds(kUpdatePeriod))),
       next_step_(kNever),
-      joints_(config.payload.robot.joints, config.initial_joints) {
+      robot_(carried(config.payload), config.initial_joints) {
   X_SL0_ = inverse(config.payload.X_PS) * config.payload.X_PL0();
 
   truth_.P.X = config_.geometry.fromHome(config_.initial_pose);
@@ -87,7 +86,7 @@ void Plant::startRobotEvents() noexcept {
         segment_start_ + event.cue.after > now_)
       continue;
     robot_event_done_[i] = true;
-    moveRobot(event.move);
+    moveRobot(event.action);
   }
   planRobotEvent();
 }
@@ -101,7 +100,7 @@ bool Plant::still() const noexcept {
   if (next_robot_event_ != kNever) return false;
   for (std::size_t i = 0; i < kLegs; ++i)
     if (slaves_[i].code() != 0 || std::abs(actuators_[i].velocity()) > kStillSpeed) return false;
-  return !joints_.moving(now_);
+  return !robot_.moving(now_);
 }
 
 /// Whole LegSlave periods, so that every phase stays, up to a second before `until`.
@@ -195,7 +194,7 @@ void Plant::readTransducers() noexcept {
 Wrench Plant::sensorLoad() const noexcept {
   const Transform X_PL0 = config_.payload.X_PL0();
   const ProperMotion felt = properMotion(truth_.P, X_PL0, config_.gravity);
-  const Wrench on_robot = newtonEuler(carried_, truth_.joints, felt).F_L0o_L0;
+  const Wrench on_robot = newtonEuler(robot_.model(), truth_.joints, felt).F_L0o_L0;
   return transfer(X_SL0_, Wrench{} - on_robot);
 }
 
@@ -235,7 +234,7 @@ void Plant::stepMechanics() noexcept {
   guess.R = rotationOf(dt * truth_.P.w) * guess.R;
   const ForwardSolution forward = forwardPose(config_.geometry, legs.L, guess);
   truth_.legs_agree = forward.ok() && forwardMotion(config_.geometry, forward.X_IP, legs, truth_.P);
-  truth_.joints = joints_.at(now_);
+  truth_.joints = robot_.at(now_);
 
   const Wrench F_So_S = sensorLoad();
   // Behind Filter 3 the acceleration is smooth again, and known at the end of the step.

@@ -9,11 +9,8 @@
 #include "ves/srms/modes.hpp"
 
 namespace ves {
-namespace {
 
-/// Calls take(row, seconds since the first tick) in every tick of the first admittance segment.
-template <class Take>
-void eachTick(const Series& series, const Take& take) {
+void eachTick(const Series& series, const std::function<void(const Row&, double)>& take) {
   const double* start = nullptr;
   int segment = -1;
   for (const Row& row : series.rows) {
@@ -27,8 +24,6 @@ void eachTick(const Series& series, const Take& take) {
     if (row.state.segment == segment) take(row, row.t - *start);
   }
 }
-
-}  // namespace
 
 Motion commanded(const Series& series) {
   const double period =
@@ -98,8 +93,8 @@ std::optional<Emulation> emulation(const Series& series, ReferenceMotions& refer
   const Interaction interaction = interactionOf(e, duration);
   const Vec6 start = commanded(series).x.front();
   const Eigen::VectorXd eta = leastSquares(interaction.base.Phi, start);
-  const Vec6 rest = start - interaction.base.Phi * eta;
-  for (Vec6& x : out.platform.x) x -= rest;
+  out.rest = start - interaction.base.Phi * eta;
+  for (Vec6& x : out.platform.x) x -= out.rest;
   const std::optional<Motion>& base =
       references.of(interaction, e.controller.period, duration, eta);
   if (!base) return {};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "evidence.hpp"
+#include "ves/results/evidence.hpp"
 
 #include <fmt/format.h>
 
@@ -94,6 +94,47 @@ std::string evidence(Check check, const Row& row, const Experiment& e) {
     case Check::kSensorSaturated: return row.has_sample ? saturated(row) : "";
     default: return {};
   }
+}
+
+std::string stirred(const state_t& s, const Experiment& experiment) {
+  const auto i = static_cast<std::size_t>(s.violation_index);
+  const StillnessLimits& limits = experiment.controller.stillness;
+  const std::string channel(i < 6 ? kWrenchComponents[i].name : "a channel");
+  switch (static_cast<StillnessViolation>(s.violation)) {
+    case StillnessViolation::kLeg:
+      return fmt::format("leg {} moved by {} counts ({} allowed)", i + 1, s.violation_amount,
+                         limits.leg_counts);
+    case StillnessViolation::kJoint: {
+      const bool known = i < experiment.robot.joint_names.size();
+      const bool turns =
+          known && experiment.controller.payload.robot.jointLink(s.violation_index).type ==
+                       JointType::kRevolute;
+      return fmt::format("{} moved by {:.4f} {} ({} allowed)",
+                         known ? experiment.robot.joint_names[i] : fmt::format("joint {}", i + 1),
+                         s.violation_amount, turns ? "rad" : "m", limits.joint);
+    }
+    case StillnessViolation::kChannel:
+      return fmt::format("{} scatters by {:.1f} counts ({} allowed): something shakes it", channel,
+                         s.violation_amount, limits.deviation);
+    case StillnessViolation::kBias:
+      return fmt::format(
+          "{} would have a bias of {:.0f} counts ({:.0f} allowed): it carries a load that is not "
+          "in the model, or less than that",
+          channel, s.violation_amount, limits.bias);
+    case StillnessViolation::kNone: break;
+  }
+  return "no stream of new samples";
+}
+
+std::string whyEarly(const Series& series) {
+  const auto first = std::find_if(series.rows.begin(), series.rows.end(),
+                                  [](const Row& row) { return row.state.aborted != 0; });
+  if (first == series.rows.end()) return {};
+  const state_t& s = first->state;
+  if (s.refusal != 0)
+    return fmt::format("a segment of the program was refused: {}",
+                       name(static_cast<Refusal>(s.refusal)));
+  return fmt::format("the calibration was refused: {}", stirred(s, series.experiment));
 }
 
 }  // namespace ves

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <functional>
 #include <iterator>
+#include <map>
 #include <vector>
 
 #include "thinning.hpp"
@@ -137,6 +138,7 @@ std::vector<std::filesystem::path> draw(const std::string& script,
 }  // namespace
 
 std::vector<std::filesystem::path> drawPlots(const Series& series,
+                                             const std::optional<ToolMotion>& tool,
                                              const std::filesystem::path& folder) {
   if (series.rows.empty()) return {};
   const Experiment& experiment = series.experiment;
@@ -219,6 +221,34 @@ std::vector<std::filesystem::path> drawPlots(const Series& series,
          {scaled(fmt::format("leg{}_commanded_m", i), kShownLength), "commanded", kColour[1],
           true}});
   finish("legs.png", legs);
+
+  if (tool && !tool->tick.empty()) {
+    Page page(series, "tool.png", experiment.name + ": the tool, carried by the base", program, 1,
+              2);
+    const auto between = [&](const std::vector<Transform>& a, const std::vector<Transform>& b) {
+      std::map<std::int64_t, Vec3> off;  // [m] by tick
+      for (std::size_t k = 0; k < tool->tick.size(); ++k) off[tool->tick[k]] = a[k].p - b[k].p;
+      return [off](int i) {
+        return [off, i](const Row& row) {
+          const auto at = off.find(row.state.header.sequence);
+          return at == off.end() ? NAN : at->second(i) * kShownLength;
+        };
+      };
+    };
+    const auto carried = between(tool->actual, tool->at_rest),
+               due = between(tool->on_base, tool->at_rest),
+               missed = between(tool->actual, tool->on_base);
+    std::vector<Curve> motions, errors;
+    for (int i = 0; i < 3; ++i) {
+      const std::string axis(coordinate(i).name);
+      motions.push_back({carried(i), axis, kColour[i], false});
+      motions.push_back({due(i), axis + ", on the base", kColour[i], true});
+      errors.push_back({missed(i), axis, kColour[i], false});
+    }
+    page.panel("carried off by [mm]", motions);
+    page.panel("actual minus on the base [mm]", errors);
+    finish("tool.png", page);
+  }
 
   return draw(script, files, folder);
 }

@@ -12,6 +12,7 @@
 #include "ves/realtime/realtime.hpp"
 #include "ves/results/plots.hpp"
 #include "ves/results/summary.hpp"
+#include "ves/results/tool_motion.hpp"
 
 namespace ves {
 
@@ -46,14 +47,17 @@ std::filesystem::path claimNewFolder(const std::filesystem::path& folder) {
 
 std::string writeResults(const std::filesystem::path& folder, const RunResult& result, bool plots) {
   const Series series = readSeries((folder / "run.lcmlog").string());
-  writeCsv(series, (folder / "series.csv").string());
-  const auto summary = summarise(series, result);
+  ReferenceMotions references;
+  const std::optional<ToolMotion> tool = toolMotion(series, emulation(series, references));
+  writeCsv(series, tool ? columnsOf(*tool) : std::vector<Column>(),
+           (folder / "series.csv").string());
+  const auto summary = summarise(series, result, references);
   writeSummary(summary, (folder / "summary.json").string());
   std::string out = table(summary) + "\n";
   for (const std::string& line : series.damage.lines()) out += fmt::format("  {}\n", line);
   std::string files = "run.lcmlog, series.csv, summary.json";
   if (plots)
-    for (const std::filesystem::path& plot : drawPlots(series, folder))
+    for (const std::filesystem::path& plot : drawPlots(series, tool, folder))
       files += ", " + plot.filename().string();
   const std::filesystem::path here = folder.lexically_relative(std::filesystem::current_path());
   const bool below = !here.empty() && *here.begin() != "..";

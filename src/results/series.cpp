@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/results/series.hpp"
+#include "ves/results/tool_motion.hpp"
 
 #include <fmt/compile.h>
 #include <fmt/format.h>
@@ -196,12 +197,20 @@ std::vector<Column> columns(const Experiment& experiment) {
   addLegs("commanded_acceleration", "m_per_s2", &state_t::leg_ddot);
   addLegs("reference", "m", &state_t::reference);
   addLegs("measured", "m", &state_t::leg_measured);
-  for (int i = 0; i < static_cast<int>(experiment.joint_names.size()); ++i)
-    add(fmt::format("{}_{}", experiment.joint_names[static_cast<std::size_t>(i)],
+  for (int i = 0; i < static_cast<int>(experiment.robot.joint_names.size()); ++i)
+    add(fmt::format("{}_{}", experiment.robot.joint_names[static_cast<std::size_t>(i)],
                     experiment.controller.payload.robot.jointLink(i).type == JointType::kRevolute
                         ? "rad"
                         : "m"),
         [=](const Row& r) { return r.has_sample ? r.sample.q[i] : NAN; });
+  if (experiment.robot.tool())
+    for (int i = 0; i < 6; ++i)
+      add(fmt::format("tool_{}_actual_{}", coordinate(i).name, coordinate(i).unit),
+          [=](const Row& r) {
+            if (!r.hasTruePose()) return static_cast<double>(NAN);
+            const JointVector q = JointVector::Map(r.truth.q);
+            return coordinateOf(toolPose(experiment, Vec6::Map(r.truth.x), q), i);
+          });
   addChannels("bias", &state_t::bias);
   addChannels("deviation", &state_t::deviation);
   addChannels("standard_error", &state_t::standard_error);
@@ -244,10 +253,11 @@ std::string csvRow(const std::vector<Column>& columns, const Row& row) {
   return line;
 }
 
-void writeCsv(const Series& series, const std::string& file) {
+void writeCsv(const Series& series, const std::vector<Column>& more, const std::string& file) {
   try {
     auto out = fmt::output_file(file);
-    const std::vector<Column> all = columns(series.experiment);
+    std::vector<Column> all = columns(series.experiment);
+    all.insert(all.end(), more.begin(), more.end());
     out.print("{}\n", csvHeader(all));
     for (const Row& row : series.rows) out.print("{}\n", csvRow(all, row));
   } catch (const std::system_error& error) {

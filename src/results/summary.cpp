@@ -8,10 +8,11 @@
 #include <fstream>
 #include <utility>
 
-#include "evidence.hpp"
 #include "ves/base/coordinates.hpp"
 #include "ves/realtime/latency.hpp"
 #include "ves/results/drift_samples.hpp"
+#include "ves/results/evidence.hpp"
+#include "ves/results/tool_motion.hpp"
 
 namespace ves {
 namespace {
@@ -160,6 +161,14 @@ void addEmulation(const Series& series, ReferenceMotions& references, nlohmann::
   out["emulation_travel_rad"] = moved.peak_attitude;
   out["emulation_error_rms_rad"] = error.rms_attitude;
   out["emulation_error_max_rad"] = error.peak_attitude;
+  const std::optional<ToolMotion> tool = toolMotion(series, e);
+  if (!tool) return;
+  const ToolDistance carried = distance(tool->actual, tool->at_rest),
+                     off = distance(tool->actual, tool->on_base);
+  out["tool_displacement_rms_m"] = carried.rms;
+  out["tool_displacement_max_m"] = carried.peak;
+  out["tool_error_rms_m"] = off.rms;
+  out["tool_error_max_m"] = off.peak;
 }
 
 /// Of a real-time run: the medians and tails of its times, their histograms, and the missed ticks.
@@ -221,6 +230,7 @@ nlohmann::ordered_json summarise(const Series& series, const RunResult& result,
     const Tripped latched(static_cast<std::uint32_t>(series.rows.back().state.latched));
     latched.forEach([&](Check check) { out["trips"].push_back(name(check)); });
   }
+  if (const std::string why = whyEarly(series); !why.empty()) out["ended_early"] = why;
   out["first_cause"] = name(result.cause);
   out["first_cause_tick"] = result.cause_tick;
   for (const Row& row : series.rows)
@@ -252,6 +262,8 @@ std::string table(const nlohmann::ordered_json& s) {
       "  ended {} after {:.2f} s ({} ticks), {:.4g} x real time, {} substitute values\n",
       s["ended"].get<std::string>(), number("simulated_s"), s["ticks"].get<std::int64_t>(),
       number("real_time_factor"), s["substitute_values"].get<int>());
+  if (const std::string why = s.value("ended_early", ""); !why.empty())
+    out += fmt::format("  ended early: {}\n", why);
   if (s["messages_lost"].get<std::int64_t>() > 0)
     out += fmt::format("  {} messages were lost (machine too busy?): the log has holes\n",
                        s["messages_lost"].get<std::int64_t>());
@@ -302,6 +314,12 @@ std::string table(const nlohmann::ordered_json& s) {
         number("emulation_travel_m") * 1e3, number("emulation_travel_rad") / kDegree,
         number("emulation_error_rms_m") * 1e3, number("emulation_error_rms_rad") / kDegree,
         number("emulation_error_max_m") * 1e3, number("emulation_error_max_rad") / kDegree);
+  if (s.contains("tool_error_rms_m"))
+    out += fmt::format(
+        "  tool     carried {:.3f} mm off by the base ({:.3f} rms); off by {:.3f} mm rms, {:.3f} "
+        "mm at most\n",
+        number("tool_displacement_max_m") * 1e3, number("tool_displacement_rms_m") * 1e3,
+        number("tool_error_rms_m") * 1e3, number("tool_error_max_m") * 1e3);
   for (const char* when : {"still", "moving"}) {
     const std::string force = fmt::format("dynamic_force_max_{}_n", when);
     if (s.contains(force))

@@ -62,6 +62,12 @@ RobotModel carried(const Payload& payload) noexcept {
   return all;
 }
 
+RobotModel withLoad(RobotModel robot, int link, const RigidBody& load) noexcept {
+  RigidBody& carrier = robot.bodyOf(link);
+  if (load.mass > 0.0) carrier = combine(carrier, {}, load);
+  return robot;
+}
+
 Transform linkPose(const Link& link, double q) noexcept {
   switch (link.type) {
     case JointType::kRevolute:

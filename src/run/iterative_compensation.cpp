@@ -18,7 +18,7 @@ class Passes {
     std::int64_t duration = 0;
     const Interaction interaction = interactionOf(experiment, duration);
     q0_ = interaction.q0;
-    moves_ = interaction.moves;
+    actions_ = interaction.actions;
     columns_ = duration / experiment.controller.period + 1;
     for (const Segment& segment : experiment.controller.program.segments) {
       if (segment.kind == SegmentKind::kAdmittance) break;
@@ -35,11 +35,9 @@ class Passes {
     e.plant.initial_joints = q0_;
     e.plant.robot_events.clear();
     constexpr int kMove = 0, kSettle = 1, kPath = 2;
-    for (const TimedMove& move : moves_) {
-      plant::RobotEvent event{{kPath, move.start * slower}, move.move};
-      event.move.duration *= slower;
-      e.plant.robot_events.push_back(event);
-    }
+    for (const TimedAction& one : actions_)
+      e.plant.robot_events.push_back(
+          {{kPath, one.start * slower}, ves::slower(one.action, slower)});
     Program& program = e.controller.program;
     program = {};
     program.size = 3;
@@ -85,7 +83,7 @@ class Passes {
   const Experiment& experiment_;
   IterativeResult& result_;
   JointVector q0_;
-  std::vector<TimedMove> moves_;
+  std::vector<TimedAction> actions_;
   Eigen::Index columns_ = 0;
   Vec6 start_ = Vec6::Zero();
 };

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
+#include "robot_orders.hpp"
 #include "ves/realtime/latency.hpp"
 #include "ves/realtime/realtime.hpp"
 #include "ves/run/flight_record.hpp"
@@ -182,7 +183,25 @@ void runPlant(const Experiment& experiment, const ProcessOptions& options,
   Bus bus(options.url);
   PlantLink link(bus);
   plant::Plant plant(experiment.plant);
+  RobotOrders robot(experiment);
   const std::int64_t period = experiment.controller.period;
+
+  const auto begin = [&](const std::optional<RobotAction>& action) {
+    if (action && !plant.moveRobot(*action))
+      throw InputError("it is in motion, elsewhere, or its hand is not free for that");
+  };
+  const auto refusable = [](const auto& act) {
+    try {
+      act();
+    } catch (const InputError& error) {
+      fmt::print(stderr, "plant: the robot does not do that: {}\n", error.what());
+    }
+  };
+  const auto moveRobot = [&](bool wait) {
+    for (const RobotOrder& order : link.takeRobotOrders())
+      refusable([&] { begin(robot.take(order, plant.truth())); });
+    refusable([&] { begin(robot.done(wait)); });
+  };
 
   const auto publish = [&](std::int64_t time, std::int64_t answers) {
     const Sample sample = plant.sample();
@@ -200,7 +219,7 @@ void runPlant(const Experiment& experiment, const ProcessOptions& options,
     while (!stop()) {
       bus.wait(100);
       link.setTime(monotonicNow());
-      for (const RobotMove& move : link.takeMoves()) plant.moveRobot(move);
+      moveRobot(true);
       const auto command = link.takeCommand();
       if (!command) continue;
       const auto& [legs, tick] = *command;
@@ -231,7 +250,7 @@ void runPlant(const Experiment& experiment, const ProcessOptions& options,
     bus.drain();
     const std::int64_t now = monotonicNow();
     link.setTime(now);
-    for (const RobotMove& move : link.takeMoves()) plant.moveRobot(move);
+    moveRobot(false);
     if (const auto command = link.takeCommand()) plant.command(command->first);
     plant.advance(now - start);
     publish(now, -1);

@@ -119,8 +119,8 @@ std::optional<Refusal> Session::order(const Order& order) {
   return {};
 }
 
-void Session::moveRobot(const RobotMove& move) {
-  bus_.publish(channel::kRobot, toMessage(move, header(self_, orders_++, monotonicNow())));
+void Session::orderRobot(const RobotOrder& order) {
+  bus_.publish(channel::kRobot, toMessage(order, header(self_, orders_++, monotonicNow())));
 }
 
 void Session::interrupt() {

@@ -26,10 +26,9 @@ class Equations {
  public:
   Equations(const Interaction& interaction, const InteractionOptions& options)
       : base_(interaction.base),
-        robot_(carried(interaction.payload)),
+        robot_(carried(interaction.payload), interaction.q0),
         X_PL0_(interaction.payload.X_PL0()),
-        options_(options),
-        joints_(robot_.joints, interaction.q0) {}
+        options_(options) {}
 
   Eigen::Index modes() const { return base_.stiffness.size(); }
   std::size_t size() const { return static_cast<std::size_t>(2 * modes() + 4); }
@@ -49,15 +48,15 @@ class Equations {
     now_ = now;
     if (options_.hold_mass > 0 && step % options_.hold_mass == 0 && step != held_at_) {
       held_at_ = step;
-      held_ = compositeBody(robot_, joints_.at(now_).q);
+      held_ = compositeBody(robot_.model(), robot_.at(now_).q);
     }
   }
-  void move(const RobotMove& move) { joints_.move(move, now_); }
+  void begin(const RobotAction& action) { robot_.begin(action, now_); }
 
   void derivative(double later, const VectorXd& y, VectorXd& dy) const {
     const Eigen::Index k = modes();
     const auto eta = y.head(k), eta_dot = y.segment(k, k);
-    const JointState q = joints_.at(now_, later);
+    const JointState q = robot_.at(now_, later);
     dy.head(k) = eta_dot;
     VectorXd right = -base_.stiffness.cwiseProduct(eta) - base_.damping * eta_dot;
     MatrixXd A;
@@ -89,11 +88,12 @@ class Equations {
  private:
   /// What the base feels of the robot, about Po in P.
   Wrench reaction(const JointState& q, const ProperMotion& L0) const {
-    return transfer(X_PL0_, Wrench{} - newtonEuler(robot_, q, L0).F_L0o_L0);
+    return transfer(X_PL0_, Wrench{} - newtonEuler(robot_.model(), q, L0).F_L0o_L0);
   }
 
   RigidBody lockedInP(const JointVector& q) const {
-    return combine(RigidBody{}, X_PL0_, options_.hold_mass > 0 ? held_ : compositeBody(robot_, q));
+    return combine(RigidBody{}, X_PL0_,
+                   options_.hold_mass > 0 ? held_ : compositeBody(robot_.model(), q));
   }
 
   /// (3.11): A, and what stands beside stiffness and damping on its right.
@@ -116,16 +116,15 @@ class Equations {
     // The wrench is affine in the base's acceleration: this much without, the locked mass with it.
     const Wrench F_Po_P = reaction(q, properMotion(P, X_PL0_, Vec3::Zero()));
     right += base_.Phi.transpose() * rotate(P.X.R, F_Po_P).stacked();
-    const Mat6 M_1 =
-        spatialMass(rotated(P.X.R, combine(RigidBody{}, X_PL0_, compositeBody(robot_, q.q))));
+    const Mat6 M_1 = spatialMass(
+        rotated(P.X.R, combine(RigidBody{}, X_PL0_, compositeBody(robot_.model(), q.q))));
     A = MatrixXd::Identity(k, k) + base_.Phi.transpose() * M_1 * base_.Phi;
   }
 
   const ModalModel& base_;
-  RobotModel robot_;
+  MovingRobot robot_;
   Transform X_PL0_;
   const InteractionOptions& options_;
-  JointPaths joints_;
   std::int64_t now_ = 0;       // [ns] start of the interval
   std::int64_t held_at_ = -1;  // [-] step that A was last computed for
   RigidBody held_;
@@ -165,17 +164,17 @@ std::vector<InteractionPoint> simulate(const Interaction& interaction,
 
   returnGslErrors();
   std::vector<InteractionPoint> out;
-  auto move = interaction.moves.begin();
+  auto next = interaction.actions.begin();
   std::int64_t now = 0;
   for (std::int64_t step = 0; now <= options.duration; ++step) {
     out.push_back(equations.point(static_cast<double>(now) * kSecondPerNanosecond, y));
     const std::int64_t end = (step + 1) * options.step;
     while (now < end) {
       equations.begin(now, step);
-      for (; move != interaction.moves.end() && move->start <= now; ++move)
-        equations.move(move->move);
+      for (; next != interaction.actions.end() && next->start <= now; ++next)
+        equations.begin(next->action);
       std::int64_t until = end;
-      if (move != interaction.moves.end()) until = std::min(until, move->start);
+      if (next != interaction.actions.end()) until = std::min(until, next->start);
       double later = 0.0;
       gsl_odeiv2_driver_reset(driver.get());
       const int status = gsl_odeiv2_driver_apply(

@@ -197,12 +197,12 @@ PlantLink::PlantLink(Bus& bus) {
                 });
   bus.subscribe(channel::kRobot, [this](const std::string&, const void* data, std::uint32_t size) {
     const auto message = decode<robot_command_t>(data, size);
-    const auto move = message ? fromMessage(*message) : std::nullopt;
-    if (!move) {
+    const auto order = message ? fromMessage(*message) : std::nullopt;
+    if (!order) {
       ++rejected_;
       return;
     }
-    moves_.push_back(*move);
+    robot_orders_.push_back(*order);
   });
 }
 

@@ -26,7 +26,16 @@ bool inRange(T x, T lo, T hi) {
   return x >= lo && x <= hi;
 }
 
-constexpr double kMaxJointValue = 1e3;    // [rad | m]
+constexpr double kMaxJointValue = 1e3;   // [rad | m]
+constexpr double kMaxPathTime = 1e4;     // [s] of a tool path
+constexpr double kMaxToolSpeed = 100.0;  // [m/s]
+constexpr double kMaxReach = 100.0;      // [m] of a tool
+constexpr double kMaxLoad = 1e6;         // [kg]
+constexpr double kMaxLoadInertia = 1e7;  // [kg m^2]
+// robot_command_t::kind and ::parts
+constexpr int kJointOrder = 0, kToolToOrder = 1, kToolByOrder = 2, kGraspOrder = 3,
+              kReleaseOrder = 4;
+constexpr int kPositionPart = 1, kRpyPart = 2, kViaPart = 4;
 constexpr double kMaxTime = 1e6;          // [s] of an order
 constexpr double kMaxTranslation = 10.0;  // [m]
 constexpr double kMaxRotation = 10.0;     // [rad]
@@ -164,12 +173,36 @@ truth_t toMessage(const plant::Truth& truth, const header_t& header) noexcept {
   return m;
 }
 
-robot_command_t toMessage(const RobotMove& move, const header_t& header) noexcept {
-  robot_command_t m;
+robot_command_t toMessage(const RobotOrder& order, const header_t& header) noexcept {
+  robot_command_t m{};
   m.header = header;
-  m.joint = move.joint;
-  m.target = move.target;
-  m.duration = move.duration;
+  if (const auto* move = std::get_if<RobotMove>(&order)) {
+    m.kind = kJointOrder;
+    m.joint = move->joint;
+    m.target = move->target;
+    m.duration = move->duration;
+  } else if (const auto* tool = std::get_if<ToolOrder>(&order)) {
+    m.kind = tool->by ? kToolByOrder : kToolToOrder;
+    m.duration = tool->duration;
+    m.speed = tool->speed;
+    m.frame = static_cast<int>(tool->in);
+    const auto part = [&](int bit, const std::optional<Vec3>& from, double(&to)[3]) {
+      if (!from) return;
+      m.parts |= bit;
+      Vec3::Map(to) = *from;
+    };
+    part(kPositionPart, tool->position, m.position);
+    part(kRpyPart, tool->rpy, m.rpy);
+    part(kViaPart, tool->via, m.via);
+  } else if (const auto* hand = std::get_if<HandOrder>(&order)) {
+    const Mat3& I = hand->body_T.I_Bcm_B;
+    m.kind = kGraspOrder;
+    m.mass = hand->body_T.mass;
+    Vec3::Map(m.com) = hand->body_T.p_BoBcm_B;
+    Vec6::Map(m.inertia) << I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2);
+  } else {
+    m.kind = kReleaseOrder;
+  }
   return m;
 }
 
@@ -234,11 +267,65 @@ std::optional<LegCommand> fromMessage(const leg_command_t& m) noexcept {
   return c;
 }
 
-std::optional<RobotMove> fromMessage(const robot_command_t& m) noexcept {
-  if (!inRange(m.joint, 0, kMaxJoints - 1) || !inRange(m.target, -kMaxJointValue, kMaxJointValue) ||
-      !inRange(m.duration, 1e-3, 1e6))
+namespace {
+
+std::optional<RobotOrder> toolOrder(const robot_command_t& m) noexcept {
+  if (!inRange(m.duration, 0.0, kMaxPathTime) || !inRange(m.speed, 0.0, kMaxToolSpeed) ||
+      (m.duration > 0.0) == (m.speed > 0.0) || !inRange(m.frame, 0, 2) ||
+      !inRange(m.parts, 1, kPositionPart | kRpyPart | kViaPart) || m.parts == kViaPart)
     return {};
-  return RobotMove{m.joint, m.target, m.duration};
+  if (m.duration > 0.0 ? m.duration < 1e-2 : m.speed < 1e-5) return {};
+  ToolOrder order;
+  order.by = m.kind == kToolByOrder;
+  order.in = static_cast<ToolOrder::Frame>(m.frame);
+  order.duration = m.duration;
+  order.speed = m.speed;
+  const auto part = [&](int bit, const double(&from)[3], double most, std::optional<Vec3>& to) {
+    if (!(m.parts & bit)) return true;
+    to = Vec3::Map(from);
+    return inRange(from[0], -most, most) && inRange(from[1], -most, most) &&
+           inRange(from[2], -most, most);
+  };
+  if (!part(kPositionPart, m.position, kMaxReach, order.position) ||
+      !part(kRpyPart, m.rpy, kMaxRotation, order.rpy) ||
+      !part(kViaPart, m.via, kMaxReach, order.via))
+    return {};
+  return order;
+}
+
+std::optional<RobotOrder> handOrder(const robot_command_t& m) noexcept {
+  RigidBody body;
+  body.mass = m.mass;
+  body.p_BoBcm_B = Vec3::Map(m.com);
+  const double* i = m.inertia;
+  body.I_Bcm_B << i[0], i[3], i[4], i[3], i[1], i[5], i[4], i[5], i[2];
+  bool good = inRange(m.mass, 0.0, kMaxLoad);
+  for (const double x : m.com) good = good && inRange(x, -kMaxReach, kMaxReach);
+  for (const double x : m.inertia) good = good && inRange(x, -kMaxLoadInertia, kMaxLoadInertia);
+  // A symmetric matrix without a negative eigenvalue has no negative principal minor.
+  const Mat3& I = body.I_Bcm_B;
+  good = good && i[0] >= 0.0 && i[1] >= 0.0 && i[2] >= 0.0 && i[0] * i[1] >= i[3] * i[3] &&
+         i[0] * i[2] >= i[4] * i[4] && i[1] * i[2] >= i[5] * i[5] &&
+         I.determinant() >= -1e-9 * std::pow(I.norm(), 3);
+  if (!good) return {};
+  return HandOrder{body};
+}
+
+}  // namespace
+
+std::optional<RobotOrder> fromMessage(const robot_command_t& m) noexcept {
+  switch (m.kind) {
+    case kJointOrder:
+      if (!inRange(m.joint, 0, kMaxJoints - 1) ||
+          !inRange(m.target, -kMaxJointValue, kMaxJointValue) || !inRange(m.duration, 1e-3, 1e6))
+        return {};
+      return RobotMove{m.joint, m.target, m.duration};
+    case kToolToOrder:
+    case kToolByOrder: return toolOrder(m);
+    case kGraspOrder: return handOrder(m);
+    case kReleaseOrder: return Release{};
+    default: return {};
+  }
 }
 
 std::optional<Order> fromMessage(const operator_t& m) noexcept {

@@ -10,6 +10,17 @@ namespace {
 
 using namespace ves;
 
+void requireGood(const RobotOrder& order) {
+  if (const auto* move = std::get_if<RobotMove>(&order)) fuzz::require(std::isfinite(move->target));
+  if (const auto* tool = std::get_if<ToolOrder>(&order)) {
+    fuzz::require((tool->duration > 0.0) != (tool->speed > 0.0));
+    for (const auto* part : {&tool->position, &tool->rpy, &tool->via})
+      fuzz::require(!*part || (*part)->allFinite());
+  }
+  if (const auto* hand = std::get_if<HandOrder>(&order))
+    fuzz::require(hand->body_T.mass >= 0.0 && hand->body_T.I_Bcm_B.allFinite());
+}
+
 void message(const std::uint8_t* data, std::int64_t size) {
   if (const auto m = decode<sample_t>(data, size))
     if (const auto s = fromMessage(*m)) {
@@ -24,7 +35,7 @@ void message(const std::uint8_t* data, std::int64_t size) {
       fuzz::require(order->segment.target.stacked().allFinite() &&
                     std::isfinite(order->segment.duration));
   if (const auto m = decode<robot_command_t>(data, size))
-    if (const auto move = fromMessage(*m)) fuzz::require(std::isfinite(move->target));
+    if (const auto order = fromMessage(*m)) requireGood(*order);
   decode<state_t>(data, size);
   decode<truth_t>(data, size);
   decode<timing_t>(data, size);

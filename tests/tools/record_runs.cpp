@@ -132,7 +132,8 @@ class Recorder {
         in.order.id = {7, i};
       }
       if (chance(0.005) && e.plant.payload.robot.joints > 0)
-        plant.moveRobot({pick(6), 0.5 * (pick(2001) - 1000) * 1e-3, 0.5 + 0.01 * pick(300)});
+        plant.moveRobot(
+            RobotMove{pick(6), 0.5 * (pick(2001) - 1000) * 1e-3, 0.5 + 0.01 * pick(300)});
       plant.command(s.command);
       in.tick += 1 + s.idle + (chance(0.003) ? 1 + pick(6) : 0);
       (void)chance(0.5);  // as many draws as ever

@@ -11,7 +11,7 @@
 namespace ves {
 
 /// The loop of an experiment at its worst: the gain of either direction, the robot in each of
-/// programPoses().
+/// programRobots().
 struct LoopVerdict {
   bool stable = true;
   DominantRoot worst;
@@ -23,10 +23,20 @@ struct LoopVerdict {
   double K_P = 0;              // [-] share of K_P that would do; 0: none from 1/8 to 1
 };
 
-/// The robot's poses in admittance control: where the program begins, and all along each motion of
-/// its admittance segments. Motions ordered by hand are not known beforehand; the oscillation
-/// monitor looks at those.
-std::vector<JointVector> programPoses(const Program& program, const plant::PlantConfig& plant);
+/// The robot at one time of a program.
+struct ProgramRobot {
+  JointVector q;
+  CarriedRobot body;  // with what it has in hand; what of that the controller has been told
+
+  bool operator==(const ProgramRobot&) const = default;
+};
+
+/// The robot in admittance control, its masses as the controller believes them: where the program
+/// begins, all along each motion of its admittance segments, and with each load in hand before and
+/// after the controller is told. What is ordered by hand is not known beforehand; the oscillation
+/// monitor looks at that.
+std::vector<ProgramRobot> programRobots(const ControllerConfig& controller,
+                                        const plant::PlantConfig& plant);
 
 /// Whether the loop decays at its worst. Much less work than the rest of the verdict.
 bool isStable(const ControllerConfig& controller, const plant::PlantConfig& plant);

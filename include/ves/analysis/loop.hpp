@@ -61,8 +61,15 @@ RigidBody lockedRobot(const ControllerConfig& controller, const JointVector& q);
 Loop loopOf(const ControllerConfig& controller, const plant::PlantConfig& plant,
             const JointVector& q, Direction direction);
 
-/// The same with another robot, which the controller knows too.
-Loop carrying(Loop loop, const RigidBody& robot_P);
+/// A robot in P with its joints locked, and what the controller takes it for.
+struct CarriedRobot {
+  RigidBody robot_P, known_P;
+
+  bool operator==(const CarriedRobot&) const = default;
+};
+
+/// The same loop with another robot.
+Loop carrying(Loop loop, const CarriedRobot& robot);
 
 /// The root of largest magnitude.
 struct DominantRoot {
@@ -81,7 +88,7 @@ double radius(const Loop& loop);
 bool decays(const Loop& loop);
 
 /// The same, carrying each of these robots in turn; most of the work is done once for all of them.
-bool decaysWithAll(const Loop& loop, const std::vector<RigidBody>& robots);
+bool decaysWithAll(const Loop& loop, const std::vector<CarriedRobot>& robots);
 
 /// Factor on the robot's inertia that the loop bears, the controller's belief unchanged, and ticks
 /// of further delay; from a stable loop.

@@ -12,6 +12,7 @@
 
 #include "ves/config/calibration.hpp"
 #include "ves/config/document.hpp"
+#include "ves/config/urdf.hpp"
 #include "ves/control/test_platform.hpp"
 #include "ves/plant/plant.hpp"
 #include "ves/srms/interaction.hpp"
@@ -25,7 +26,7 @@ struct Experiment {
   std::string description;
   ControllerConfig controller;
   plant::PlantConfig plant;
-  std::vector<std::string> joint_names;
+  UrdfRobot robot;  // as configured; without frames: none
   std::vector<std::string> warnings;
   std::vector<std::string> notes;                // known oddities of a robot's file
   std::optional<CalibrationRecord> calibration;  // that the bias comes from

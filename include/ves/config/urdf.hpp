@@ -3,6 +3,7 @@
 // Robots from URDF.
 #pragma once
 
+#include <cmath>
 #include <map>
 #include <memory>
 #include <set>
@@ -33,10 +34,16 @@ const char* jointUnitName(JointType type);  // "deg" | "m"
 struct UrdfRobot {
   RobotModel model;
   std::vector<std::string> joint_names;  // of the joint values
+  JointVector fastest;                   // [rad/s | m/s] of each; infinite where it is not said
   std::vector<NamedFrame> frames;        // every link, base first
   std::vector<std::string> held;         // "joint 'finger' at 0.01 m": could move, and does not
   std::vector<std::string> warnings;     // what no rigid body can have, accepted all the same
   std::string choice;  // what moves, where nobody has said it and it is no serial arm
+  int tip = -1;  // [-] of `frames`, as chosen, or the end of a robot that has but one; -1: none
+
+  const NamedFrame* tool() const {
+    return tip < 0 ? nullptr : &frames[static_cast<std::size_t>(tip)];
+  }
 };
 
 /// A robot description, a tree of links, and the robots that can be made of it.
@@ -52,6 +59,7 @@ class UrdfTree {
     std::string name;
     JointType type = JointType::kRevolute;
     double lower = 0.0, upper = 0.0;   // [rad | m]
+    double fastest = HUGE_VAL;         // [rad/s | m/s]
     std::string follows;               // the joint whose value moves it (mimic); empty: its own
     double ratio = 1.0, offset = 0.0;  // [-], [rad | m] stands at ratio * value + offset
 

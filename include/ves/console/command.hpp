@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "ves/config/experiment.hpp"
+#include "ves/planning/robot_order.hpp"
 
 namespace ves {
 
@@ -20,6 +21,9 @@ enum class Verb {
   kCalibration,
   kTare,
   kRobot,
+  kTool,
+  kGrasp,
+  kRelease,
   kCollect,
   kStatus,
   kHold,
@@ -53,7 +57,7 @@ struct Command {
   Order order;            // of what moves the platform
   Collection collection;  // of kCollect
   double wait = 0.0;      // [s] of kWait
-  RobotMove robot;        // of kRobot
+  RobotOrder robot;       // of kRobot, kTool, kGrasp and kRelease
 };
 
 /// A number in [lo, hi]. Throws InputError that says so.

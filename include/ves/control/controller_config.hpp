@@ -47,12 +47,27 @@ enum class Stability : std::int32_t {
 };
 inline constexpr std::string_view kStabilityNames[] = {"unknown", "stable", "unstable", "forced"};
 
+/// What the robot has in hand, as the controller is told at a time of the program.
+struct ToldLoad {
+  Cue cue;
+  int link = -1;   // [-] that carries it; -1: link 0
+  RigidBody body;  // in that link's frame; without mass: nothing
+};
+
+inline constexpr int kMaxToldLoads = 16;
+
+struct ToldLoads {
+  int size = 0;
+  std::array<ToldLoad, kMaxToldLoads> loads{};  // by segment and time
+};
+
 struct ControllerConfig {
   std::int64_t period = 10'000'000;  // [ns]
   Geometry geometry;
   ForceSensor sensor;
   Vec6 bias = Vec6::Zero();          // [count] until a calibration replaces it
-  Payload payload;                   // the controller's model of it
+  Payload payload;                   // the controller's model of it,
+  ToldLoads told_loads;              // and of what the robot takes in hand
   Vec3 gravity = {0.0, 0.0, -9.81};  // [m/s^2] g_I
   ModalModel admittance;
   LegCodec legs;

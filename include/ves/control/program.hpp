@@ -39,6 +39,12 @@ struct Program {
   std::array<Segment, kMaxSegments> segments{};
 };
 
+/// When something happens: `after` the controller's program reached `segment`.
+struct Cue {
+  int segment = 0;         // [-]
+  std::int64_t after = 0;  // [ns]
+};
+
 /// One of its segments is admittance control.
 bool wantsAdmittance(const Program& program) noexcept;
 

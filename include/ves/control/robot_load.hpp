@@ -5,9 +5,38 @@
 #pragma once
 
 #include "ves/control/controller_config.hpp"
+#include "ves/control/tick_clock.hpp"
 #include "ves/math/butterworth.hpp"
 
 namespace ves {
+
+/// The model of what the sensor carries: as configured, and what the robot has in hand as far as
+/// that is told.
+class KnownPayload {
+ public:
+  explicit KnownPayload(const ControllerConfig& config);
+
+  /// `commanded` [-]: segment that the last command named, which the program's times count from.
+  void update(const Elapsed& elapsed, std::int32_t commanded) noexcept;
+
+  const Payload& payload() const noexcept { return payload_; }
+  /// All of it, counted into the robot's links.
+  const RobotModel& carried() const noexcept { return carried_; }
+  bool changed() const noexcept { return changed_; }  // in this tick
+
+ private:
+  void take(const ToldLoad& load) noexcept;
+
+  RobotModel empty_;  // with nothing in hand
+  ToldLoads told_;
+  std::int64_t period_;  // [ns]
+  Payload payload_;
+  RobotModel carried_;
+  std::int32_t segment_ = -1;  // [-]
+  std::int64_t began_ = 0;     // [-] tick of the first command that named it
+  std::array<bool, kMaxToldLoads> done_{};
+  bool changed_ = false;
+};
 
 /// The weight of everything the sensor carries.
 class StaticLoad {
@@ -16,7 +45,8 @@ class StaticLoad {
 
   /// For joints at q, the platform turned by R_IP. `share` [-] of the compensation is in;
   /// `engaged`: the legs follow, so that the weight has a past.
-  void update(const JointVector& q, const Mat3& R_IP, bool engaged, double share) noexcept;
+  void update(const Payload& payload, const JointVector& q, const Mat3& R_IP, bool engaged,
+              double share) noexcept;
 
   /// [count] what the weight alone would read, without a bias.
   const Vec6& counts() const noexcept { return counts_; }
@@ -25,7 +55,6 @@ class StaticLoad {
   const Wrench& wrench() const noexcept { return F_So_S_; }
 
  private:
-  Payload payload_;
   Vec3 gravity_;
   Mat6 S_proc_;  // [count per N | N m]
   bool filters_;
@@ -43,8 +72,8 @@ class RobotInertia {
   /// F_Po_I that it takes to move the composite body; zero when that is not compensated, or before
   /// the legs are `engaged`. `count` [-] of the tick; `legs` with the accelerations that the
   /// sensor's filter shows; `share` [-] of the compensation that is in.
-  Wrench update(std::int64_t count, const JointVector& q, const Transform& X_IP,
-                const LegMotion& legs, bool engaged, double share) noexcept;
+  Wrench update(const KnownPayload& known, std::int64_t count, const JointVector& q,
+                const Transform& X_IP, const LegMotion& legs, bool engaged, double share) noexcept;
 
   /// Of the composite body about Po in I, times the share. [kg, kg m, kg m^2]
   const Mat6& M_1() const noexcept { return M_1_; }
@@ -53,8 +82,6 @@ class RobotInertia {
   bool compensated_;
   int mass_update_;  // [-] ticks for which a composite body is kept
   Geometry geometry_;
-  RobotModel carried_;
-  Transform X_PL0_;
   RigidBody composite_P_;
   Mat6 M_1_ = Mat6::Zero();
 };

@@ -56,6 +56,7 @@ class TestPlatform {
   SampleStream samples_;
   CompensationShare share_;
   LegEstimator legs_;
+  KnownPayload known_;
   StaticLoad load_;
   SensorBias bias_;
   RobotInertia robot_;

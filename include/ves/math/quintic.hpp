@@ -15,24 +15,28 @@ struct PathPoint {
   Eigen::Matrix<double, N, 1> x_ddot = Eigen::Matrix<double, N, 1>::Zero();
 };
 
-/// The fifth-order polynomial (report, chapter 3) from any state to rest: ends at x1 with zero rate
-/// and acceleration, and stays there.
+/// The fifth-order polynomial (report, chapter 3) from any state to any other; behind its end it
+/// stays there.
 template <int N>
 class Quintic {
  public:
   using Vector = Eigen::Matrix<double, N, 1>;
 
   Quintic() = default;
-  Quintic(const PathPoint<N>& from, const Vector& to, double duration) noexcept
-      : T_(duration), end_(to) {
-    const Vector h = to - from.x, v = from.x_dot * T_, a = from.x_ddot * (T_ * T_);
+  Quintic(const PathPoint<N>& from, const PathPoint<N>& to, double duration) noexcept
+      : T_(duration), end_(to.x) {
+    const Vector h = to.x - from.x, v = from.x_dot * T_, a = from.x_ddot * (T_ * T_);
+    const Vector w = to.x_dot * T_, b = to.x_ddot * (T_ * T_);
     c_.col(0) = from.x;
     c_.col(1) = v;
     c_.col(2) = 0.5 * a;
-    c_.col(3) = 10.0 * h - 6.0 * v - 1.5 * a;
-    c_.col(4) = -15.0 * h + 8.0 * v + 1.5 * a;
-    c_.col(5) = 6.0 * h - 3.0 * v - 0.5 * a;
+    c_.col(3) = 10.0 * h - 6.0 * v - 1.5 * a - 4.0 * w + 0.5 * b;
+    c_.col(4) = -15.0 * h + 8.0 * v + 1.5 * a + 7.0 * w - b;
+    c_.col(5) = 6.0 * h - 3.0 * v - 0.5 * a - 3.0 * w + 0.5 * b;
   }
+  /// To rest.
+  Quintic(const PathPoint<N>& from, const Vector& to, double duration) noexcept
+      : Quintic(from, PathPoint<N>{to, Vector::Zero(), Vector::Zero()}, duration) {}
 
   PathPoint<N> at(double t) const noexcept {
     PathPoint<N> point;
@@ -52,6 +56,13 @@ class Quintic {
   }
 
   double duration() const noexcept { return T_; }  // [s]
+  /// The same way, taken so many times slower.
+  Quintic slower(double times) const noexcept {
+    Quintic out = *this;
+    out.T_ *= times;
+    return out;
+  }
+  bool operator==(const Quintic&) const = default;
   const Vector& end() const noexcept { return end_; }
 
  private:

@@ -9,15 +9,10 @@
 #include <optional>
 #include <string_view>
 
+#include "ves/control/program.hpp"
 #include "ves/control/sample.hpp"
 
 namespace ves::plant {
-
-/// When something happens: `after` the controller's program reached `segment`.
-struct Cue {
-  int segment = 0;         // [-]
-  std::int64_t after = 0;  // [ns]
-};
 
 enum class Fault {
   kWrenchFrozen,   // all channels keep their reading

@@ -20,7 +20,7 @@
 #include "ves/plant/faults.hpp"
 #include "ves/plant/force_torque_sensor.hpp"
 #include "ves/plant/leg_slave.hpp"
-#include "ves/robot/joint_paths.hpp"
+#include "ves/planning/moving_robot.hpp"
 #include "ves/robot/newton_euler.hpp"
 #include "ves/robot/payload.hpp"
 
@@ -34,7 +34,7 @@ enum class LegFilters {
 
 struct RobotEvent {
   Cue cue;
-  RobotMove move;
+  RobotAction action;
 };
 
 /// What the LegSlaves do when nobody commands them: they keep their last reference, and after a
@@ -97,8 +97,8 @@ class Plant {
   /// that names it.
   void command(const LegCommand& command) noexcept;
 
-  /// Starts a joint motion now; see JointPaths::move().
-  bool moveRobot(const RobotMove& move) noexcept { return joints_.move(move, now_); }
+  /// Begins now; false where MovingRobot::begin() refuses.
+  bool moveRobot(const RobotAction& action) noexcept { return robot_.begin(action, now_); }
 
   /// Time passes, up to and including the events at `until` [ns]. Where nothing moves, more than
   /// kSkipped of it are passed over at once: the noise goes on from where it was.
@@ -127,7 +127,6 @@ class Plant {
   LegMotion legOutputs(double dt) noexcept;
 
   PlantConfig config_;
-  RobotModel carried_;  // the robot with all rigid plates counted into its base
   Transform X_SL0_;
   std::vector<LegSlave> slaves_;
   std::vector<Actuator> actuators_;
@@ -153,7 +152,7 @@ class Plant {
   LegCounts home_{}, parked_from_{};
   std::vector<Injector> injectors_;  // one a fault
   std::vector<bool> robot_event_done_;
-  JointPaths joints_;
+  MovingRobot robot_;  // all rigid plates counted into its base
   Truth truth_;
 };
 

@@ -18,6 +18,9 @@ struct Motion {
   std::vector<Vec6> x, x_dot;  // [m, rad], [m/s, rad/s]
 };
 
+/// Calls take(row, seconds since its first tick) in every tick of the first admittance segment.
+void eachTick(const Series& series, const std::function<void(const Row&, double)>& take);
+
 /// What the admittance model commanded, each state at the time it is for.
 Motion commanded(const Series& series);
 
@@ -40,8 +43,9 @@ Distance travel(const Motion& motion);
 
 /// What an emulation did, and what it is for.
 struct Emulation {
-  Motion platform;  // in the first admittance segment
-  Motion base;      // the robot on its base in free space (SRMS-robot, nothing left out)
+  Motion platform;           // in the first admittance segment, without `rest`
+  Motion base;               // the robot on its base in free space (SRMS-robot, nothing left out)
+  Vec6 rest = Vec6::Zero();  // [m, rad] of the pose at its start, what the modes do not express
 };
 
 /// The base's motions that were needed last. Runs that differ in noise, gains or filters share one:

@@ -4,15 +4,17 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <vector>
 
-#include "ves/results/series.hpp"
+#include "ves/results/tool_motion.hpp"
 
 namespace ves {
 
-/// Draws pose.png, error.png, wrench.png and legs.png from folder/series.csv with gnuplot; returns
-/// those that exist now.
+/// Draws pose.png, error.png, wrench.png, legs.png and, where the robot has a tool and a base to
+/// move on, tool.png with gnuplot; returns those that exist now.
 std::vector<std::filesystem::path> drawPlots(const Series& series,
+                                             const std::optional<ToolMotion>& tool,
                                              const std::filesystem::path& folder);
 
 }  // namespace ves

@@ -81,7 +81,7 @@ bool selected(const std::string& name, const std::vector<std::string>& select,
 std::string csvHeader(const std::vector<Column>& columns);
 std::string csvRow(const std::vector<Column>& columns, const Row& row);
 
-/// Throws InputError when the file cannot be written.
-void writeCsv(const Series& series, const std::string& file);
+/// All columns, and `more`. Throws InputError when the file cannot be written.
+void writeCsv(const Series& series, const std::vector<Column>& more, const std::string& file);
 
 }  // namespace ves

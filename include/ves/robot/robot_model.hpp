@@ -58,6 +58,8 @@ struct RobotModel {
   std::array<int, kMaxJoints> own{};  // [-] index of the link that joint value i moves itself
 
   const Link& link(int i) const { return links[static_cast<std::size_t>(i)]; }
+  /// Of a link that moves, or of link 0 (-1).
+  RigidBody& bodyOf(int i) { return i < 0 ? base : links[static_cast<std::size_t>(i)].body; }
   const Link& jointLink(int i) const { return link(own[static_cast<std::size_t>(i)]); }
   /// A further link. It has a joint of its own, or follows the one it names.
   void add(const Link& link, bool follows = false);
@@ -97,6 +99,9 @@ LinkPoses linkPoses(const RobotModel& robot, const JointVector& q) noexcept;
 
 /// The whole robot with its joints locked at q, in L0: [M_1] of (3.1).
 RigidBody compositeBody(const RobotModel& robot, const JointVector& q) noexcept;
+
+/// The robot with a further body on a link (-1: link 0), rigid, in that link's frame.
+RobotModel withLoad(RobotModel robot, int link, const RigidBody& load) noexcept;
 
 /// Pose of a link's frame in its parent's, its joint at q.
 Transform linkPose(const Link& link, double q) noexcept;

@@ -38,8 +38,8 @@ class Session {
   /// nothing when the controller does not answer.
   std::optional<Refusal> order(const Order& order);
 
-  /// Asks the simulated robot to move a joint.
-  void moveRobot(const RobotMove& move);
+  /// Asks something of the simulated robot.
+  void orderRobot(const RobotOrder& order);
 
   /// A gentle end, as by Ctrl-C.
   void interrupt();

@@ -15,16 +15,16 @@
 #include <vector>
 
 #include "ves/control/admittance_model.hpp"
-#include "ves/robot/joint_paths.hpp"
+#include "ves/planning/moving_robot.hpp"
 #include "ves/robot/payload.hpp"
 
 namespace ves {
 
-struct TimedMove {
+struct TimedAction {
   std::int64_t start = 0;  // [ns]
-  RobotMove move;
+  RobotAction action;
 
-  bool operator==(const TimedMove&) const = default;
+  bool operator==(const TimedAction&) const = default;
 };
 
 /// The two that meet.
@@ -32,7 +32,7 @@ struct Interaction {
   ModalModel base;                       // at Po
   Payload payload;                       // what stands on it
   JointVector q0 = JointVector::Zero();  // [rad | m]
-  std::vector<TimedMove> moves;          // by time
+  std::vector<TimedAction> actions;      // of the robot, by time
 
   bool operator==(const Interaction&) const = default;
 };

@@ -137,7 +137,7 @@ class PlantLink {
   std::optional<std::pair<LegCommand, std::int64_t>> takeCommand() noexcept {
     return std::exchange(command_, std::nullopt);
   }
-  std::vector<RobotMove> takeMoves() { return std::exchange(moves_, {}); }
+  std::vector<RobotOrder> takeRobotOrders() { return std::exchange(robot_orders_, {}); }
   std::int64_t rejected() const noexcept { return rejected_; }
 
  private:
@@ -149,7 +149,7 @@ class PlantLink {
   std::int64_t heard_ = 0;      // [ns]
   std::int64_t sequence_ = -2;  // of the master's last command
   std::optional<std::pair<LegCommand, std::int64_t>> command_;
-  std::vector<RobotMove> moves_;
+  std::vector<RobotOrder> robot_orders_;
   std::int64_t rejected_ = 0;
 };
 

@@ -16,6 +16,7 @@
 #include <ves/truth_t.hpp>
 
 #include "ves/control/test_platform.hpp"
+#include "ves/planning/robot_order.hpp"
 #include "ves/plant/plant.hpp"
 
 namespace ves {
@@ -41,7 +42,7 @@ truth_t toMessage(const plant::Truth& truth, const header_t& header) noexcept;
 /// `controller` is the header.source of the states of the one that is meant.
 operator_t toMessage(const Order& order, std::int64_t controller, const header_t& header) noexcept;
 
-robot_command_t toMessage(const RobotMove& move, const header_t& header) noexcept;
+robot_command_t toMessage(const RobotOrder& order, const header_t& header) noexcept;
 
 /// "panic button, floor mat"; empty when none tripped.
 std::string names(Tripped tripped);
@@ -51,7 +52,7 @@ inline constexpr std::int64_t kMaxSequence = 100'000'000'000;  // [-] 30 years o
 /// Nothing when a value is out of range or not a number.
 std::optional<Sample> fromMessage(const sample_t& message) noexcept;
 std::optional<LegCommand> fromMessage(const leg_command_t& message) noexcept;
-std::optional<RobotMove> fromMessage(const robot_command_t& message) noexcept;
+std::optional<RobotOrder> fromMessage(const robot_command_t& message) noexcept;
 std::optional<Order> fromMessage(const operator_t& message) noexcept;
 
 /// Decodes bytes of one message; nothing when they are not exactly that.

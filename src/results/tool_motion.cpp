@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/results/tool_motion.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "ves/base/coordinates.hpp"
+
+namespace ves {
+
+Transform toolPose(const Experiment& experiment, const Vec6& x, const JointVector& q) {
+  const plant::PlantConfig& plant = experiment.plant;
+  return plant.geometry.fromHome(Pose::from(x)) * plant.payload.X_PL0() *
+         experiment.robot.tool()->pose(linkPoses(plant.payload.robot, q));
+}
+
+std::optional<ToolMotion> toolMotion(const Series& series, const std::optional<Emulation>& e) {
+  const Experiment& experiment = series.experiment;
+  if (!e || !experiment.robot.tool()) return {};
+  ToolMotion out;
+  std::size_t i = 0;
+  eachTick(series, [&](const Row& row, double) {
+    if (!row.hasTruePose() || i >= e->base.x.size()) return;
+    const JointVector q = JointVector::Map(row.truth.q);
+    out.tick.push_back(row.state.header.sequence);
+    out.actual.push_back(toolPose(experiment, Vec6::Map(row.truth.x), q));
+    out.on_base.push_back(toolPose(experiment, e->base.x[i] + e->rest, q));
+    out.at_rest.push_back(toolPose(experiment, e->base.x.front() + e->rest, q));
+    ++i;
+  });
+  return out;
+}
+
+double coordinateOf(const Transform& X_IT, int i) {
+  return i < 3 ? X_IT.p(i) : fixedAngles(X_IT.R)(i - 3);
+}
+
+std::vector<Column> columnsOf(const ToolMotion& motion) {
+  std::map<std::int64_t, Transform> at;  // by tick
+  for (std::size_t k = 0; k < motion.tick.size(); ++k) at[motion.tick[k]] = motion.on_base[k];
+  std::vector<Column> out;
+  for (int i = 0; i < 6; ++i)
+    out.push_back({fmt::format("tool_{}_base_{}", coordinate(i).name, coordinate(i).unit),
+                   [at, i](const Row& row) {
+                     const auto found = at.find(row.state.header.sequence);
+                     return found == at.end() ? NAN : coordinateOf(found->second, i);
+                   }});
+  return out;
+}
+
+ToolDistance distance(const std::vector<Transform>& a, const std::vector<Transform>& b) {
+  ToolDistance d;
+  const std::size_t n = std::min(a.size(), b.size());
+  for (std::size_t i = 0; i < n; ++i) {
+    const double off = (a[i].p - b[i].p).norm();
+    d.rms += off * off / static_cast<double>(n);
+    d.peak = std::max(d.peak, off);
+  }
+  d.rms = std::sqrt(d.rms);
+  return d;
+}
+
+}  // namespace ves

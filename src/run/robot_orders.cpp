@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "robot_orders.hpp"
+
+#include <chrono>
+
+namespace ves {
+
+RobotOrders::RobotOrders(const Experiment& experiment) : experiment_(experiment) {}
+
+std::optional<RobotAction> RobotOrders::take(const RobotOrder& order, const plant::Truth& truth) {
+  if (const auto* move = std::get_if<RobotMove>(&order)) return *move;
+  if (std::holds_alternative<Release>(order)) return Release{};
+  const UrdfRobot& robot = experiment_.robot;
+  const NamedFrame* frame = robot.tool();
+  if (!frame) throw InputError("the robot has no tip, want tip: LINK in its configuration");
+  if (const auto* hand = std::get_if<HandOrder>(&order))
+    return Grasp{frame->link, combine(RigidBody{}, frame->X_link, hand->body_T)};
+  if (planned_.valid()) throw InputError("another tool path is being planned");
+  if (!planner_)
+    planner_ = std::make_unique<ToolPlanner>(robot.model, frame->link, frame->X_link, robot.fastest,
+                                             robot.joint_names);
+  const auto& tool = std::get<ToolOrder>(order);
+  const Transform X_PL0 = experiment_.plant.payload.X_PL0();
+  const Transform X_FL0 = tool.in == ToolOrder::Frame::kRobot      ? Transform{}
+                          : tool.in == ToolOrder::Frame::kPlatform ? X_PL0
+                                                                   : truth.P.X * X_PL0;
+  const JointVector q = truth.joints.q;
+  const ToolGoal goal = goalOf(tool, X_FL0, planner_->pose(q));
+  planned_ = std::async(std::launch::async, [this, q, goal] { return planner_->plan(q, goal); });
+  return {};
+}
+
+std::optional<RobotAction> RobotOrders::done(bool wait) {
+  if (!planned_.valid() ||
+      (!wait && planned_.wait_for(std::chrono::seconds(0)) != std::future_status::ready))
+    return {};
+  return ToolMove{std::make_shared<JointTrajectory>(planned_.get())};
+}
+
+}  // namespace ves
