@@ -87,6 +87,14 @@ int robotCommand(int argc, char** argv) {
         "kg m^2\n",
         all.mass, c.x(), c.y(), c.z(), robot.frames.front().name, moments(0), moments(1),
         moments(2));
+    if (const NamedFrame* tool = robot.tool()) {
+      const Transform X_L0T = tool->pose(linkPoses(robot.model, q));
+      const Vec3 rpy = fixedAngles(X_L0T.R) / kDegree;
+      fmt::print("  tool '{}' at {:.4f}, {:.4f}, {:.4f} m, turned by {:.3f}, {:.3f}, {:.3f} deg\n",
+                 tool->name, X_L0T.p.x(), X_L0T.p.y(), X_L0T.p.z(), rpy.x(), rpy.y(), rpy.z());
+    } else {
+      fmt::print("  several ends, none of them the tool (tip: LINK would say which)\n");
+    }
     printTree(robot, q);
     if (!robot.choice.empty()) fmt::print("\n  {}\n", robot.choice);
     for (const std::string& warning : robot.warnings) fmt::print("\n  {}\n", warning);

@@ -4,14 +4,12 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include <kdl/treeidsolver_recursive_newton_euler.hpp>
 #include <random>
 
-#include "support/momentum.hpp"
-#include "support/poses.hpp"
 #include "support/refusal.hpp"
 #include "support/rig.hpp"
 #include "support/robots.hpp"
+#include "support/trees.hpp"
 #include "ves/control/gravity_compensation.hpp"
 #include "ves/identification/mass_parameters.hpp"
 #include "ves/robot/newton_euler.hpp"
@@ -20,7 +18,7 @@
 namespace ves {
 namespace {
 
-constexpr double kG = 9.81;
+using test::kG;
 
 /// A tree that nobody designed: every link on any earlier one, some fixed, some that follow.
 std::string anyTree(unsigned seed, int links = 14) {
@@ -60,17 +58,6 @@ std::string anyTree(unsigned seed, int links = 14) {
   return text + "</robot>\n";
 }
 
-JointState anyState(int joints, std::mt19937& random) {
-  std::uniform_real_distribution<double> u(-2.0, 2.0);
-  JointState s;
-  for (int i = 0; i < joints; ++i) {
-    s.q(i) = u(random);
-    s.q_dot(i) = u(random);
-    s.q_ddot(i) = u(random);
-  }
-  return s;
-}
-
 class Tree : public testing::TestWithParam<unsigned> {
  protected:
   const std::string text = anyTree(GetParam());
@@ -79,62 +66,11 @@ class Tree : public testing::TestWithParam<unsigned> {
 };
 
 TEST_P(Tree, JointEffortsAreKdls) {
-  // KDL knows no joints that follow: there each has an effort of its own, and by virtual work the
-  // master feels the sum of ratio times effort.
-  const KDL::Tree kdl = test::kdlTree(text);
-  KDL::TreeIdSolver_RNE solver(kdl, KDL::Vector(0, 0, -kG));
-  const unsigned n = kdl.getNrOfJoints();
-  std::mt19937 random(GetParam());
-  ProperMotion base;
-  base.a = {0.0, 0.0, kG};
-  for (int k = 0; k < 50; ++k) {
-    const JointState s = anyState(robot.model.joints, random);
-    KDL::JntArray q(n), qd(n), qdd(n), tau(n);
-    JointVector expected = JointVector::Zero();
-    std::vector<std::tuple<unsigned, int, double>> at;  // of KDL's, ours, ratio
-    for (const auto& [name, segment] : kdl.getSegments()) {
-      const UrdfTree::Joint* joint = tree.find(segment.segment.getJoint().getName());
-      if (!joint) continue;
-      const auto i =
-          std::find(robot.joint_names.begin(), robot.joint_names.end(), joint->master()) -
-          robot.joint_names.begin();
-      const unsigned theirs = segment.q_nr;
-      q(theirs) = joint->ratio * s.q(i) + joint->offset;
-      qd(theirs) = joint->ratio * s.q_dot(i);
-      qdd(theirs) = joint->ratio * s.q_ddot(i);
-      at.emplace_back(theirs, static_cast<int>(i), joint->ratio);
-    }
-    ASSERT_EQ(at.size(), n);
-    ASSERT_GE(solver.CartToJnt(q, qd, qdd, KDL::WrenchMap(), tau), 0);
-    for (const auto& [theirs, ours, ratio] : at) expected(ours) += ratio * tau(theirs);
-    const JointVector found = newtonEuler(robot.model, s, base).tau;
-    ASSERT_LT((found - expected).norm(), 1e-9 * (1.0 + expected.norm()));
-  }
+  EXPECT_LT(test::offFromKdl(tree, text, robot, GetParam()), 1e-12);
 }
 
 TEST_P(Tree, WrenchIsTheRateOfMomentum) {
-  const test::Swing base(GetParam());
-  const int n = robot.model.joints;
-  const auto swing = [&](double t) {
-    JointState s;
-    for (int i = 0; i < n; ++i) {
-      const double w = 1.0 + 0.2 * i;
-      s.q(i) = 0.6 * std::sin(w * t + i);
-      s.q_dot(i) = 0.6 * w * std::cos(w * t + i);
-      s.q_ddot(i) = -0.6 * w * w * std::sin(w * t + i);
-    }
-    return s;
-  };
-  const double h = 1e-3, t = 0.7;
-  const auto p = [&](double s) {
-    return test::momentum(
-        robot.model, [&](double at) { return base.motion(at).X; },
-        [&](double at) { return swing(at).q; }, s, h);
-  };
-  const Vec6 rate = (p(t - 2 * h) - 8 * p(t - h) + 8 * p(t + h) - p(t + 2 * h)) / (12 * h);
-  const BodyMotion P = base.motion(t);
-  const Wrench F = newtonEuler(robot.model, swing(t), properMotion(P, {}, Vec3::Zero())).F_L0o_L0;
-  EXPECT_LT((transfer(P.X, F).stacked() - rate).norm(), 1e-6 * (1.0 + rate.norm()));
+  EXPECT_LT(test::offFromMomentum(robot.model, GetParam()), 1e-9);
 }
 
 TEST_P(Tree, AtRestCompensationRegressorAndNewtonEulerAgree) {
@@ -142,7 +78,7 @@ TEST_P(Tree, AtRestCompensationRegressorAndNewtonEulerAgree) {
   Payload payload;
   payload.robot = robot.model;
   for (int k = 0; k < 20; ++k) {
-    const JointVector q = anyState(robot.model.joints, random).q;
+    const JointVector q = test::anyState(robot.model.joints, random).q;
     const Mat3 R = rotation({0.3, -0.5, 0.1 * k});
     const Vec3 g(0.0, 0.0, -kG);
     const Vec6 felt = staticWrench(payload, q, R, g).stacked();
@@ -162,7 +98,7 @@ TEST_P(Tree, AtRestCompensationRegressorAndNewtonEulerAgree) {
 
 TEST_P(Tree, HeldJointsWeighWhatStandingOnesWeigh) {
   std::mt19937 random(GetParam());
-  const JointVector q = anyState(robot.model.joints, random).q;
+  const JointVector q = test::anyState(robot.model.joints, random).q;
   std::map<std::string, double> held;
   std::set<std::string> moving;
   for (int i = 0; i < robot.model.joints; ++i) {

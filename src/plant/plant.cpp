@@ -86,7 +86,7 @@ void Plant::startRobotEvents() noexcept {
         segment_start_ + event.cue.after > now_)
       continue;
     robot_event_done_[i] = true;
-    moveRobot(event.action);
+    if (!moveRobot(event.action)) ++refused_events_;
   }
   planRobotEvent();
 }

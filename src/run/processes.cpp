@@ -184,11 +184,12 @@ void runPlant(const Experiment& experiment, const ProcessOptions& options,
   PlantLink link(bus);
   plant::Plant plant(experiment.plant);
   RobotOrders robot(experiment);
+  constexpr const char* kNotNow = "it is in motion, elsewhere, or its hand is not free for that";
+  int refused_events = 0;
   const std::int64_t period = experiment.controller.period;
 
   const auto begin = [&](const std::optional<RobotAction>& action) {
-    if (action && !plant.moveRobot(*action))
-      throw InputError("it is in motion, elsewhere, or its hand is not free for that");
+    if (action && !plant.moveRobot(*action)) throw InputError(kNotNow);
   };
   const auto refusable = [](const auto& act) {
     try {
@@ -201,6 +202,8 @@ void runPlant(const Experiment& experiment, const ProcessOptions& options,
     for (const RobotOrder& order : link.takeRobotOrders())
       refusable([&] { begin(robot.take(order, plant.truth())); });
     refusable([&] { begin(robot.done(wait)); });
+    if (plant.refusedEvents() > std::exchange(refused_events, plant.refusedEvents()))
+      fmt::print(stderr, "plant: the robot leaves out an event of the program: {}\n", kNotNow);
   };
 
   const auto publish = [&](std::int64_t time, std::int64_t answers) {

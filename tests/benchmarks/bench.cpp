@@ -80,8 +80,7 @@ BENCHMARK(ForwardRatesAndAccelerations);
 
 // Dynamics
 
-void newtonEulerOf(benchmark::State& state, const char* name) {
-  const RobotModel robot = test::robot(name).model;
+void newtonEulerOf(benchmark::State& state, const RobotModel& robot) {
   const BodyMotion P = test::Swing(1).motion(0.3);
   JointState q;
   q.q.setConstant(0.3);
@@ -92,10 +91,27 @@ void newtonEulerOf(benchmark::State& state, const char* name) {
     benchmark::DoNotOptimize(newtonEuler(robot, q, properMotion(P, {}, {0.0, 0.0, -9.81})));
   }
 }
-void NewtonEulerMovingBasePuma(benchmark::State& state) { newtonEulerOf(state, "puma560"); }
-void NewtonEulerMovingBaseDoss(benchmark::State& state) { newtonEulerOf(state, "doss"); }
+void NewtonEulerMovingBasePuma(benchmark::State& state) {
+  newtonEulerOf(state, test::robot("puma560").model);
+}
+void NewtonEulerMovingBaseDoss(benchmark::State& state) {
+  newtonEulerOf(state, test::robot("doss").model);
+}
+/// Two PUMAs on one base: twelve joints.
+void NewtonEulerMovingBaseTwoArms(benchmark::State& state) {
+  RobotModel both = test::robot("puma560").model;
+  const RobotModel other = both;
+  for (int i = 0; i < other.size; ++i) {
+    Link link = other.link(i);
+    link.parent = i == 0 ? -1 : both.size - 1;
+    if (i == 0) link.X_parent.p.y() += 0.8;
+    both.add(link);
+  }
+  newtonEulerOf(state, both);
+}
 BENCHMARK(NewtonEulerMovingBasePuma);
 BENCHMARK(NewtonEulerMovingBaseDoss);
+BENCHMARK(NewtonEulerMovingBaseTwoArms);
 
 void kdl(benchmark::State& state, const char* name) {
   const KDL::Chain chain = test::kdlChain(name);

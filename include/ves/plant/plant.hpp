@@ -16,11 +16,11 @@
 
 #include "ves/control/program.hpp"
 #include "ves/control/sample.hpp"
+#include "ves/planning/moving_robot.hpp"
 #include "ves/plant/actuator.hpp"
 #include "ves/plant/faults.hpp"
 #include "ves/plant/force_torque_sensor.hpp"
 #include "ves/plant/leg_slave.hpp"
-#include "ves/planning/moving_robot.hpp"
 #include "ves/robot/newton_euler.hpp"
 #include "ves/robot/payload.hpp"
 
@@ -110,6 +110,8 @@ class Plant {
   /// As of the last step of the mechanics; now, right after sample().
   const Truth& truth() const noexcept { return truth_; }
   std::int64_t time() const noexcept { return now_; }  // [ns]
+  /// [-] events that the robot could not begin, as it was elsewhere or its hand not free.
+  int refusedEvents() const noexcept { return refused_events_; }
 
  private:
   void runEvents(std::int64_t until) noexcept;
@@ -152,6 +154,7 @@ class Plant {
   LegCounts home_{}, parked_from_{};
   std::vector<Injector> injectors_;  // one a fault
   std::vector<bool> robot_event_done_;
+  int refused_events_ = 0;
   MovingRobot robot_;  // all rigid plates counted into its base
   Truth truth_;
 };
