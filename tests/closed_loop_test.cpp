@@ -13,6 +13,7 @@
 #include "support/rig.hpp"
 #include "ves/results/series.hpp"
 #include "ves/results/summary.hpp"
+#include "ves/results/tool_motion.hpp"
 #include "ves/run/run.hpp"
 
 namespace ves {
@@ -231,6 +232,57 @@ TEST_F(ClosedLoop, RatesFrom75HertzOnStayTrueToTheModel) {
     }
     EXPECT_GT(n, 500);
   }
+}
+
+TEST_F(ClosedLoop, AProgramThatEndsEarlySaysWhy) {
+  const auto why = [&](const std::string& program, const std::string& more) {
+    const Series series = run(experiment("puma_on_table_4_1", {"program=" + program, more}));
+    EXPECT_TRUE(result_.aborted);
+    EXPECT_NE(table(summarise(series, result_)).find("  ended early: "), std::string::npos);
+    return summarise(series, result_)["ended_early"].get<std::string>();
+  };
+  // The sensor's bias is far from zero until it is calibrated.
+  EXPECT_EQ(why("[{move: {}}, {admittance: {duration_s: 1}}]", "seed=1"),
+            "a segment of the program was refused: the measured wrench is too large: calibrate, or "
+            "remove the load");
+  // Nor would a calibration take a robot for granted that weighs twice what is known.
+  const std::string said = why("[{calibration: {}}]", "plant_mismatch={mass: 2}");
+  EXPECT_EQ(said.rfind("the calibration was refused: fz would have a bias of ", 0), 0u) << said;
+  const Series series = run(experiment("puma_on_table_4_1", {"program=[{move: {}}]"}));
+  EXPECT_FALSE(summarise(series, result_).contains("ended_early"));
+}
+
+TEST_F(ClosedLoop, TheToolIsWhereThePlatformCarriesIt) {
+  // The arm's two lowest modes do not express where the platform stands: all of that is kept.
+  const Series series = run(experiment(
+      "srms_deploy_puma",
+      {"sensor.noise=false", "base.keep_modes=2",
+       "program=[{move: {}}, {calibration: {}}, {move: {to: {z_m: 0.05, beta_deg: 3}, duration_s: "
+       "3}}, {admittance: {duration_s: 2}, robot: [{at_s: 0, duration_s: 2, joint: joint_1, "
+       "to_deg_or_m: 20}]}]"}));
+  const Experiment& e = series.experiment;
+  const std::optional<Emulation> emulated = emulation(series);
+  const std::optional<ToolMotion> tool = toolMotion(series, emulated);
+  ASSERT_TRUE(tool);
+  ASSERT_GE(tool->tick.size(), 199u);
+  // Link by link, by hand.
+  std::size_t k = 0;
+  for (const Row& row : series.rows) {
+    if (k == tool->tick.size() || row.state.header.sequence != tool->tick[k]) continue;
+    Transform X = e.plant.geometry.fromHome(Pose::from(Vec6::Map(row.truth.x)));
+    X = X * e.plant.payload.X_PR * e.plant.payload.X_RL0;
+    for (int i = 0; i < 6; ++i) X = X * linkPose(e.plant.payload.robot.link(i), row.truth.q[i]);
+    ASSERT_LT((tool->actual[k].p - X.p).norm(), 1e-12);
+    ++k;
+  }
+  EXPECT_EQ(k, tool->tick.size());
+  EXPECT_LT((tool->on_base.front().p - tool->at_rest.front().p).norm(), 1e-12);
+  EXPECT_LT((tool->actual.front().p - tool->at_rest.front().p).norm(), 1e-3);
+  const ToolDistance off = distance(tool->actual, tool->on_base);
+  const auto summary = summarise(series, result_);
+  EXPECT_EQ(summary["tool_error_max_m"].get<double>(), off.peak);
+  EXPECT_EQ(summary["tool_displacement_max_m"].get<double>(),
+            distance(tool->actual, tool->at_rest).peak);
 }
 
 TEST_F(ClosedLoop, SwitchStopsTheRunAndLeavesItsName) {

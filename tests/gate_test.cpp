@@ -159,6 +159,20 @@ TEST(Gate, LooksAtThePosesBetweenTheEndsOfAMove) {
   EXPECT_FALSE(stable("-90"));
 }
 
+TEST(Gate, ALoadThatNobodyToldOfIsNotCompensated) {
+  Experiment e = test::experiment("srms_deploy_doss", {"controller.compensation.observer=true",
+                                                       "controller.compensation.inertia=true"});
+  const Loop loop = loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kExtending);
+  const RigidBody light = loop.robot_P, heavy = heavier(3.0, light);
+  Loop untold = loop;
+  untold.robot_P = heavy;
+  Loop told = untold;
+  told.model.robot_P = heavy;
+  EXPECT_NEAR(radius(carrying(loop, {heavy, light})), radius(untold), 1e-12);
+  EXPECT_NEAR(radius(carrying(loop, {heavy, heavy})), radius(told), 1e-12);
+  EXPECT_GT(std::abs(radius(told) - radius(untold)), 1e-6);
+}
+
 TEST(Gate, LooksAtEachMotionWhateverElseThereIs) {
   const Experiment e = test::experiment(
       "puma_on_table_4_1",

@@ -266,12 +266,32 @@ TEST(KnownPayload, IsToldAtItsTimeOfItsSegmentAndOfNothingElse) {
   EXPECT_EQ(known.payload().robot.base, empty.base);
   EXPECT_FALSE(pass(2));  // released
   EXPECT_FALSE(pass(-1));
-  // The program once more; late ticks are time too.
+  // The program once more. Two ticks were missed after the first command that named segment 1.
   EXPECT_FALSE(pass(0));
-  EXPECT_FALSE(pass(1));
   tick += 2;
-  known.update({tick, 0, 2, 2, 0}, 1);
+  known.update({tick, 0, 2, 2, 1}, 1);
   EXPECT_EQ(known.payload().robot.link(5).body, both);
+}
+
+TEST(RobotInertia, KnowsALoadAtOnceHoweverLongItKeepsItsBody) {
+  ControllerConfig config = puma();
+  config.compensation.inertia = config.compensation.observer = true;
+  config.compensation.mass_update = 100;
+  config.told_loads.size = 1;
+  config.told_loads.loads[0] = {{0, 0}, 5, {7.0, Vec3::Zero(), Mat3::Zero()}};
+  KnownPayload known(config);
+  RobotInertia inertia(config);
+  const BodyMotion P{config.geometry.fromHome({}), Vec3::Zero(), Vec3::Zero(), Vec3::Zero(),
+                     Vec3::Zero()};
+  const LegMotion legs = legMotion(config.geometry, P);
+  const auto mass = [&](std::int64_t count, std::int32_t segment) {
+    known.update({count, count, 0, 0, 0}, segment);
+    inertia.update(known, count, JointVector::Zero(), P.X, legs, true, 1.0);
+    return inertia.M_1()(0, 0);
+  };
+  const double empty = mass(0, -1);
+  EXPECT_NEAR(mass(1, 0) - empty, 7.0, 1e-9);
+  EXPECT_NEAR(mass(2, 0) - empty, 7.0, 1e-9);
 }
 
 // Plans

@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // The robot led by its tool, and what it takes in hand.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
 
 #include <kdl/chainfksolverpos_recursive.hpp>
 #include <random>
@@ -69,7 +74,7 @@ TEST_P(ToolPath, ALineIsStraightAndItsSpeedATrapezoid) {
   for (double t = 0.0; t <= path.duration(); t += h) {
     const Transform X = tool(path.at(t).q);
     const Vec3 off = X.p - from.p;
-    ASSERT_LT((off - along * along.dot(off)).norm(), 1e-7) << t;
+    ASSERT_LT((off - along * along.dot(off)).norm(), 5e-9) << t;
     ASSERT_LT((X.R - from.R).norm(), 1e-7) << t;
     const double speed =
         (tool(path.at(t + 0.5 * h).q).p - tool(path.at(t - 0.5 * h).q).p).norm() / h;
@@ -83,6 +88,17 @@ TEST_P(ToolPath, ALineIsStraightAndItsSpeedATrapezoid) {
   EXPECT_LT(most_step, 1.1e-4);  // 0.1 m/s^2 for a millisecond: no jumps
   EXPECT_LT((tool(path.at(path.duration()).q).p - from.p - way).norm(), 1e-7);
   EXPECT_EQ(path.at(path.duration() + 1.0).q_dot.norm(), 0.0);
+}
+
+TEST_P(ToolPath, AQuickLineIsStraightToo) {  // a tenth of a second for 0.3 m
+  const Transform from = tool(q0);
+  const Vec3 way = 0.3 * Vec3(0.2, 0.7, -0.5).normalized(), along = way.normalized();
+  const JointTrajectory path = plan({{from.R, from.p + way}, {}, 0.1, 0.0});
+  for (double t = 0.0; t <= 0.1; t += 1e-4) {
+    const Vec3 off = tool(path.at(t).q).p - from.p;
+    ASSERT_LT((off - along * along.dot(off)).norm(), 1e-5) << t;
+  }
+  EXPECT_LT((tool(path.end()).p - from.p - way).norm(), 2e-9);
 }
 
 TEST_P(ToolPath, RatesAndAccelerationsAreTheDerivatives) {
@@ -120,6 +136,24 @@ TEST_P(ToolPath, AnArcKeepsItsDistanceAndMeetsItsPoint) {
   EXPECT_LT(nearest, 1e-4);
   EXPECT_NEAR(length, 0.1 * (M_PI / 2 + 0.5), 1e-4);  // the short way, through via
   EXPECT_LT((tool(path.end()).p - end).norm(), 1e-7);
+}
+
+TEST_P(ToolPath, AnArcMayBeMoreThanHalfACircle) {
+  const Transform from = tool(q0);
+  const double r = 0.05;
+  const Vec3 centre = from.p + Vec3(0.0, r, 0.0);
+  // Three quarters of a turn from -y, by way of +y: the end is at -z.
+  const JointTrajectory path =
+      plan({{from.R, centre + Vec3(0, 0, -r)}, Vec3(centre + Vec3(0, 0, r)), 3.0, 0.0});
+  double length = 0.0;
+  Vec3 before = from.p;
+  for (double t = 0.0; t <= 3.0; t += 1e-3) {
+    const Vec3 p = tool(path.at(t).q).p;
+    ASSERT_NEAR((p - centre).norm(), r, 1e-7);
+    length += (p - before).norm();
+    before = p;
+  }
+  EXPECT_NEAR(length, 1.5 * M_PI * r, 1e-4);
 }
 
 TEST_P(ToolPath, ATurnIsEvenAndStaysInPlace) {
@@ -351,6 +385,9 @@ TEST(ToolEvents, RefuseInOneLine) {
   EXPECT_EQ(said("{at_s: 1, duration_s: 2, tool: {by: {position_m: [0, 0, -0.1]}}}, {at_s: 2.5, "
                  "duration_s: 1, joint: joint_2, to_deg_or_m: -70}"),
             "robot[1].at_s: the tool path before it may last until 3 s");
+  const std::string down = "duration_s: 2, tool: {by: {position_m: [0, 0, -0.1]}}}";
+  EXPECT_EQ(said("{at_s: 1, " + down + ", {at_s: 2, " + down),
+            "robot[1].at_s: joint 'joint_1' may move until 3 s, want the tool path after that");
   const std::string inertial =
       "{at_s: 1, duration_s: 2, tool: {by: {position_m: [0, 0, -0.1]}, in: inertial}}";
   EXPECT_EQ(
@@ -387,6 +424,19 @@ TEST(Grasp, ItsWeightIsOnTheSensorUntilItIsReleased) {
   const Transform X_PT = e.plant.payload.X_PL0() * toolOf(e, e.plant.initial_joints);
   const Vec3 r = plant.truth().P.X.R * (X_PT * Vec3(0.0, 0.0, 0.1));
   EXPECT_LT((full.n - empty.n - r.cross(Vec3(0.0, 0.0, -4.0 * 9.81))).norm(), 1e-4);
+}
+
+TEST(Grasp, IsInTheToolsFrame) {  // a metre from the link that carries it
+  const auto file =
+      std::filesystem::temp_directory_path() / fmt::format("ves_scara_{}.urdf", getpid());
+  std::ofstream(file) << kScara;
+  const Experiment e = test::experiment(
+      "puma_on_table_4_1", {"robot.urdf=" + file.string(), "robot.joints_deg_or_m=[0, 0, 0]",
+                            "program=[{move: {}, robot: [{at_s: 0, grasp: {" + kBox + "}}]}]"});
+  std::filesystem::remove(file);
+  const auto& grasp = std::get<Grasp>(e.plant.robot_events.at(0).action);
+  EXPECT_EQ(grasp.link, 2);
+  EXPECT_LT((grasp.body.p_BoBcm_B - Vec3(1.0, 0.0, 0.1)).norm(), 1e-12);
 }
 
 TEST(Grasp, GravityCompensationKnowsItFromWhenItIsTold) {
@@ -489,11 +539,13 @@ TEST(MovingRobot, RefusesWhatItCannotBegin) {
   EXPECT_FALSE(robot.begin(follow, s / 2));
   EXPECT_FALSE(robot.begin(follow, 2 * s));  // joint 1 is elsewhere
   EXPECT_TRUE(robot.begin(RobotMove{1, 0.0, 1.0}, 2 * s));
-  EXPECT_TRUE(robot.begin(follow, 3 * s));
+  robot.begin(RobotMove{2, 0.0, 0.5}, 3 * s);  // goes nowhere, but is on its way
+  EXPECT_FALSE(robot.begin(follow, 3 * s));
+  EXPECT_TRUE(robot.begin(follow, 3 * s + s / 2));
   EXPECT_FALSE(robot.begin(RobotMove{1, 0.5, 1.0}, 4 * s));
   EXPECT_TRUE(robot.moving(4 * s));
-  EXPECT_NEAR(robot.at(4 * s).q(0), 0.5, 1e-12);
-  EXPECT_FALSE(robot.moving(5 * s));
+  EXPECT_NEAR(robot.at(4 * s + s / 2).q(0), 0.5, 1e-12);
+  EXPECT_FALSE(robot.moving(5 * s + s / 2));
   EXPECT_EQ(robot.at(6 * s).q(0), 1.0);
   EXPECT_TRUE(robot.begin(RobotMove{0, 0.0, 1.0}, 6 * s));
   EXPECT_EQ(robot.at(7 * s).q(0), 0.0);

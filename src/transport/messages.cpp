@@ -5,6 +5,7 @@
 
 #include <unistd.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -302,12 +303,9 @@ std::optional<RobotOrder> handOrder(const robot_command_t& m) noexcept {
   bool good = inRange(m.mass, 0.0, kMaxLoad);
   for (const double x : m.com) good = good && inRange(x, -kMaxReach, kMaxReach);
   for (const double x : m.inertia) good = good && inRange(x, -kMaxLoadInertia, kMaxLoadInertia);
-  // A symmetric matrix without a negative eigenvalue has no negative principal minor.
-  const Mat3& I = body.I_Bcm_B;
-  good = good && i[0] >= 0.0 && i[1] >= 0.0 && i[2] >= 0.0 && i[0] * i[1] >= i[3] * i[3] &&
-         i[0] * i[2] >= i[4] * i[4] && i[1] * i[2] >= i[5] * i[5] &&
-         I.determinant() >= -1e-9 * std::pow(I.norm(), 3);
   if (!good) return {};
+  const Eigen::SelfAdjointEigenSolver<Mat3> principal(body.I_Bcm_B, Eigen::EigenvaluesOnly);
+  if (!(principal.eigenvalues()(0) >= -1e-9 * body.I_Bcm_B.norm())) return {};
   return HandOrder{body};
 }
 
