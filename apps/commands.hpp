@@ -20,5 +20,6 @@ int runCommand(int argc, char** argv);
 int srmsCommand(int argc, char** argv);
 int stabilityCommand(int argc, char** argv);
 int sweepCommand(int argc, char** argv);
+int viewCommand(int argc, char** argv);
 
 }  // namespace ves::app

@@ -23,6 +23,7 @@ constexpr Command kCommands[] = {
     {"plant", "the machine as a process, by hand", plantCommand},
     {"replay", "a recorded run through the controller again (--check: bit for bit)", replayCommand},
     {"collect", "variables of a log as CSV (--select, --rate, --list)", collectCommand},
+    {"view", "a recorded run in three dimensions, as one file for a browser", viewCommand},
     {"report", "chapter 4 of the report once more, as one page", reportCommand},
     {"srms", "the flexible base, and the robot on it (chapter 3)", srmsCommand},
     {"stability", "whether the force feedback decays: this machine's, Appendix E's",

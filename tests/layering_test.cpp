@@ -46,6 +46,7 @@ const std::map<std::string, Names> kMayInclude = [] {
   add("sweep", {}, "results");
   add("faults", {}, "run");
   add("console", {}, "results");
+  add("view", {}, "results");
   return may;
 }();
 

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// A run as something to look at: bodies fixed in named frames, and the frames' poses over time. All
+// geometry is computed here; whoever draws only places what it is told.
+#pragma once
+
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "ves/results/comparison.hpp"
+
+namespace ves {
+
+class Scene {
+ public:
+  /// Keeps nothing of the experiment but what it draws.
+  explicit Scene(const Experiment& experiment);
+
+  /// What stays: "name", "frames" (name and parent of each, in the order of a picture's poses),
+  /// "shapes" (kind, frame, sizes [m]), "scalars" (names), "phases", "segments", "checks".
+  const nlohmann::ordered_json& description() const { return description_; }
+
+  /// One instant, as many numbers as width(): seven a frame {p [m], quaternion x y z w} in its
+  /// parent, then the scalars. NaN where nobody knows. `base`: the pose of the base in free space,
+  /// from home.
+  std::vector<float> picture(const Row& row, const std::optional<Vec6>& base) const;
+  std::size_t width() const { return 7 * frames_.size() + scalars_.size(); }
+
+ private:
+  void addFrame(const std::string& name, const std::string& parent);
+  void addRobot();
+
+  struct Scalar {
+    std::string name;
+    std::function<double(const Row&)> value;
+  };
+  Geometry geometry_;
+  Payload payload_;
+  std::optional<NamedFrame> tool_;
+  std::vector<std::string> frames_;
+  std::vector<Scalar> scalars_;
+  nlohmann::ordered_json description_;
+};
+
+/// A recorded run for a page: its scene, and pictures at most `rate` [1/s] times a second.
+nlohmann::ordered_json recording(const Series& series, double rate);
+
+}  // namespace ves

@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/view/scene.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "ves/base/coordinates.hpp"
+#include "ves/control/safety_checks.hpp"
+#include "ves/view/page.hpp"
+
+namespace ves {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kLinkRadius = 0.035;   // [m] of what has no shape in its description
+constexpr double kPlate = 0.02;         // [m] thickness
+constexpr double kRodRadius = 0.018;    // [m]
+constexpr double kShortestLink = 1e-3;  // [m] worth drawing
+
+Json json(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
+
+/// Axes whose z points along a leg; how they are turned about it does not matter.
+Mat3 along(const Vec3& way) {
+  return Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), way).toRotationMatrix();
+}
+
+Json capsule(const std::string& frame, const Vec3& from, const Vec3& to) {
+  return {{"kind", "capsule"},
+          {"frame", frame},
+          {"from", json(from)},
+          {"to", json(to)},
+          {"radius", kLinkRadius}};
+}
+
+Json plate(const std::string& frame, const std::array<Vec3, kLegs>& corners, double top) {
+  Json points = Json::array();
+  for (const Vec3& p : corners) points.push_back({p.x(), p.y()});
+  return {{"kind", "plate"},
+          {"frame", frame},
+          {"corners", points},
+          {"top", top},
+          {"thickness", kPlate}};
+}
+
+std::string linkFrame(int i) { return fmt::format("link{}", i + 1); }
+
+}  // namespace
+
+Scene::Scene(const Experiment& e) : geometry_(e.plant.geometry), payload_(e.plant.payload) {
+  if (e.robot.tool()) tool_ = *e.robot.tool();
+  description_ = {{"name", e.name}, {"description", e.description}, {"home", geometry_.home_height},
+                  {"reach", 0.0},   {"frames", Json::array()},      {"shapes", Json::array()}};
+  Json& shapes = description_["shapes"];
+  addFrame("platform", "");
+  addFrame("base", "");  // where the base in free space would be
+  shapes.push_back(plate("", geometry_.p_IBi_I, 0.0));
+  shapes.push_back(plate("platform", geometry_.p_PPi_P, 0.0));
+  const double length = e.plant.actuator.length_min;
+  for (int i = 0; i < kLegs; ++i) {
+    const std::string leg = fmt::format("leg{}", i + 1), rod = fmt::format("rod{}", i + 1);
+    addFrame(leg, "");
+    addFrame(rod, "");
+    shapes.push_back({{"kind", "cylinder"},
+                      {"frame", leg},
+                      {"length", 0.85 * length},
+                      {"radius", 2.0 * kRodRadius},
+                      {"leg", i}});
+    shapes.push_back({{"kind", "cylinder"},
+                      {"frame", rod},
+                      {"length", -length},
+                      {"radius", kRodRadius},
+                      {"leg", i}});
+  }
+  shapes.push_back({{"kind", "cylinder"},
+                    {"frame", "platform"},
+                    {"radius", 0.08},
+                    {"length", payload_.X_PS.p.z()}});
+  if (!e.robot.frames.empty()) addRobot();
+
+  const auto six = [&](const std::string& name, const double(state_t::*field)[6]) {
+    for (int i = 0; i < 6; ++i)
+      scalars_.push_back({fmt::format(fmt::runtime(name), coordinate(i).name),
+                          [field, i](const Row& r) { return (r.state.*field)[i]; }});
+  };
+  const auto add = [&](const char* name, auto value) { scalars_.push_back({name, value}); };
+  add("t_s", [](const Row& r) { return r.t; });
+  add("phase", [](const Row& r) { return static_cast<double>(r.state.phase); });
+  add("segment", [](const Row& r) { return static_cast<double>(r.state.segment); });
+  add("kind", [](const Row& r) { return static_cast<double>(r.state.kind); });
+  add("cause", [](const Row& r) { return static_cast<double>(r.state.cause); });
+  six("{}_commanded", &state_t::x_desired);
+  six("{}_measured", &state_t::x_measured);
+  for (int i = 0; i < 6; ++i)
+    scalars_.push_back({fmt::format("{}_actual", coordinate(i).name),
+                        [i](const Row& r) { return r.hasTruePose() ? r.truth.x[i] : NAN; }});
+  for (int i = 0; i < 6; ++i)
+    scalars_.push_back({fmt::format("{}_dynamic", wrenchComponent(i).name),
+                        [i](const Row& r) { return r.state.dynamic[i]; }});
+  for (int i = 0; i < kLegs; ++i)
+    scalars_.push_back({fmt::format("leg{}_error_m", i + 1),
+                        [i](const Row& r) { return r.state.leg[i] - r.state.leg_measured[i]; }});
+  const SafetyLimits limits = e.controller.safety;
+  for (int i = 0; i < kLegs; ++i)  // 1 in the middle of the stroke, 0 at a limit
+    scalars_.push_back({fmt::format("leg{}_margin", i + 1), [i, limits](const Row& r) {
+                          const double half = 0.5 * (limits.leg_max - limits.leg_min);
+                          return std::min(r.state.leg_measured[i] - limits.leg_min,
+                                          limits.leg_max - r.state.leg_measured[i]) /
+                                 half;
+                        }});
+  add("late_s", [](const Row& r) {
+    return r.has_timing ? static_cast<double>(r.timing.late_ns) * kSecondPerNanosecond : NAN;
+  });
+
+  Json names = Json::array(), phases = Json::array(), segments = Json::array(),
+       kinds = Json::array(), checks = Json::array();
+  for (const Scalar& scalar : scalars_) names.push_back(scalar.name);
+  for (int i = 0; i <= static_cast<int>(Phase::kStopping); ++i)
+    phases.push_back(name(static_cast<Phase>(i)));
+  for (int i = 0; i < e.controller.program.size; ++i)
+    segments.push_back(name(e.controller.program.segments[static_cast<std::size_t>(i)].kind));
+  for (int i = 0; i < static_cast<int>(SegmentKind::kCount); ++i)
+    kinds.push_back(name(static_cast<SegmentKind>(i)));
+  for (int i = 0; i < static_cast<int>(Check::kCount); ++i)
+    checks.push_back(name(static_cast<Check>(i)));
+  description_["scalars"] = names;
+  description_["phases"] = phases;
+  description_["segments"] = segments;
+  description_["kinds"] = kinds;
+  description_["checks"] = checks;
+}
+
+void Scene::addFrame(const std::string& name, const std::string& parent) {
+  frames_.push_back(name);
+  description_["frames"].push_back({{"name", name}, {"parent", parent}});
+}
+
+/// Capsules from joint to joint, and to the tool.
+void Scene::addRobot() {
+  const RobotModel& robot = payload_.robot;
+  Json& shapes = description_["shapes"];
+  const Transform X_PL0 = payload_.X_PL0();
+  shapes.push_back({{"kind", "cylinder"},
+                    {"frame", "platform"},
+                    {"from", json(payload_.X_PR.p)},
+                    {"length", X_PL0.p.z() - payload_.X_PR.p.z()},
+                    {"radius", 0.2}});
+  for (int i = 0; i < robot.size; ++i) addFrame(linkFrame(i), "platform");
+  for (int i = 0; i < robot.size; ++i) {
+    const Link& link = robot.link(i);
+    const Vec3 joint = link.X_parent.p;
+    if (!(joint.norm() > kShortestLink)) continue;
+    if (link.parent < 0)
+      shapes.push_back(capsule("platform", X_PL0.p, X_PL0 * joint));
+    else
+      shapes.push_back(capsule(linkFrame(link.parent), Vec3::Zero(), joint));
+  }
+  double reach = tool_ ? tool_->X_link.p.norm() : 0.0;
+  for (int i = 0; i < robot.size; ++i) reach += robot.link(i).X_parent.p.norm();
+  description_["reach"] = reach;
+  if (!tool_) return;
+  addFrame("tool", "platform");
+  if (tool_->link >= 0 && tool_->X_link.p.norm() > kShortestLink)
+    shapes.push_back(capsule(linkFrame(tool_->link), Vec3::Zero(), tool_->X_link.p));
+  shapes.push_back({{"kind", "axes"}, {"frame", "tool"}, {"size", 0.15}});
+}
+
+std::vector<float> Scene::picture(const Row& row, const std::optional<Vec6>& base) const {
+  std::vector<float> out;
+  out.reserve(width());
+  const auto put = [&](const Transform& X) {
+    const Eigen::Quaterniond q(X.R);
+    for (const double x : {X.p.x(), X.p.y(), X.p.z(), q.x(), q.y(), q.z(), q.w()})
+      out.push_back(static_cast<float>(x));
+  };
+  // Where nobody knows the truth, what is measured.
+  const Vec6 x =
+      row.hasTruePose() ? Vec6(Vec6::Map(row.truth.x)) : Vec6(Vec6::Map(row.state.x_measured));
+  const JointVector q = row.has_truth    ? JointVector(JointVector::Map(row.truth.q))
+                        : row.has_sample ? JointVector(JointVector::Map(row.sample.q))
+                                         : JointVector(JointVector::Zero());
+  const Transform X_IP = geometry_.fromHome(Pose::from(x));
+  put(X_IP);
+  if (base)
+    put(geometry_.fromHome(Pose::from(*base)));
+  else
+    out.insert(out.end(), 7, NAN);
+  for (std::size_t i = 0; i < kLegs; ++i) {
+    const Vec3 from = geometry_.p_IBi_I[i], to = X_IP * geometry_.p_PPi_P[i];
+    const Mat3 R = along(to - from);
+    put({R, from});
+    put({R, to});
+  }
+  const LinkPoses X_L0L = linkPoses(payload_.robot, q);
+  const Transform X_PL0 = payload_.X_PL0();
+  for (int i = 0; i < payload_.robot.size; ++i) put(X_PL0 * X_L0L[i]);
+  if (tool_) put(X_PL0 * tool_->pose(X_L0L));
+  for (const Scalar& scalar : scalars_) out.push_back(static_cast<float>(scalar.value(row)));
+  return out;
+}
+
+nlohmann::ordered_json recording(const Series& series, double rate) {
+  const Scene scene(series.experiment);
+  std::map<std::int64_t, Vec6> base;  // by tick
+  if (const std::optional<Emulation> e = emulation(series)) {
+    std::size_t k = 0;
+    eachTick(series, [&](const Row& row, double) {
+      if (k < e->base.x.size()) base[row.state.header.sequence] = e->base.x[k] + e->rest;
+      ++k;
+    });
+  }
+  std::vector<float> numbers;
+  double next = -HUGE_VAL;
+  for (const Row& row : series.rows) {
+    if (row.t < next - 0.5e-9) continue;
+    next = row.t + 1.0 / rate;
+    const auto at = base.find(row.state.header.sequence);
+    const std::vector<float> one =
+        scene.picture(row, at == base.end() ? std::nullopt : std::optional<Vec6>(at->second));
+    numbers.insert(numbers.end(), one.begin(), one.end());
+  }
+  Json out = {{"scene", scene.description()}, {"width", scene.width()}};
+  out["pictures"] = base64(numbers);
+  return out;
+}
+
+}  // namespace ves
