@@ -8,13 +8,14 @@
 #include "app.hpp"
 #include "commands.hpp"
 #include "ves/results/series.hpp"
+#include "ves/view/ros2.hpp"
 
 namespace ves::app {
 
 int collectCommand(int argc, char** argv) {
   CLI::App cli("Takes variables out of a log, as CSV with the unit in every column's name.",
                "ves collect");
-  std::string log, out;
+  std::string log, out, mcap;
   std::vector<std::string> select;
   bool list = false;
   double rate = 0.0, from = 0.0, duration = HUGE_VAL;
@@ -27,9 +28,14 @@ int collectCommand(int argc, char** argv) {
   cli.add_option("--from", from, "[s] since the first tick")->check(inRange(0.0, 1e9));
   cli.add_option("--duration", duration, "[s]; to the end by default")->check(inRange(0.0, 1e9));
   cli.add_option("--out", out, "file; standard output by default");
+  cli.add_option("--mcap", mcap, "everything into this MCAP file for Foxglove, PlotJuggler, Rerun");
   return run(cli, argc, argv, [&] {
     const Series series = readSeries(log);
     printDamage(series.damage);
+    if (!mcap.empty()) {
+      writeMcap(series, log, mcap);
+      return kDone;
+    }
     std::vector<Column> chosen;
     std::vector<bool> used(select.size(), false);
     for (const Column& column : columns(series.experiment))

@@ -26,6 +26,7 @@ struct Arm {
   const char* name;
   std::vector<double> degrees;  // a pose far from singular ones
 };
+void PrintTo(const Arm& arm, std::ostream* out) { *out << arm.name; }
 const Arm kPuma = {"puma560", {10, -60, 150, 20, 45, 30}};
 const Arm kDoss = {"doss", {10, 20, -70, 80, 20, 30, 15}};
 

@@ -202,16 +202,21 @@ std::vector<float> Scene::picture(const Row& row, const std::optional<Vec6>& bas
   return out;
 }
 
+std::map<std::int64_t, Vec6> basePoses(const Series& series) {
+  std::map<std::int64_t, Vec6> out;
+  const std::optional<Emulation> e = emulation(series);
+  if (!e) return out;
+  std::size_t k = 0;
+  eachTick(series, [&](const Row& row, double) {
+    if (k < e->base.x.size()) out[row.state.header.sequence] = e->base.x[k] + e->rest;
+    ++k;
+  });
+  return out;
+}
+
 nlohmann::ordered_json recording(const Series& series, double rate) {
   const Scene scene(series.experiment);
-  std::map<std::int64_t, Vec6> base;  // by tick
-  if (const std::optional<Emulation> e = emulation(series)) {
-    std::size_t k = 0;
-    eachTick(series, [&](const Row& row, double) {
-      if (k < e->base.x.size()) base[row.state.header.sequence] = e->base.x[k] + e->rest;
-      ++k;
-    });
-  }
+  const std::map<std::int64_t, Vec6> base = basePoses(series);
   std::vector<float> numbers;
   double next = -HUGE_VAL;
   for (const Row& row : series.rows) {

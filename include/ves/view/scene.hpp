@@ -5,6 +5,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -44,6 +45,9 @@ class Scene {
   std::vector<Scalar> scalars_;
   nlohmann::ordered_json description_;
 };
+
+/// Where the base in free space would be, from home, by tick; empty without an emulation.
+std::map<std::int64_t, Vec6> basePoses(const Series& series);
 
 /// A recorded run for a page: its scene, and pictures at most `rate` [1/s] times a second.
 nlohmann::ordered_json recording(const Series& series, double rate);

@@ -1,0 +1,437 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/view/ros2.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cstring>
+#include <map>
+#include <set>
+#include <sstream>
+
+#include "ves/base/build.hpp"
+#include "ves/results/evidence.hpp"
+#include "ves/transport/channels.hpp"
+#include "ves/view/mcap.hpp"
+#include "ves/view/scene.hpp"
+#include "ves/view/sources.hpp"
+
+namespace ves {
+namespace {
+
+// --- CDR, little-endian --------------------------------------------------------------------------
+
+class Cdr {
+ public:
+  template <class T>
+  Cdr& number(T value) {
+    while ((bytes_.size() - kHead) % sizeof(T) != 0) bytes_ += '\0';
+    char raw[sizeof(T)];
+    std::memcpy(raw, &value, sizeof(T));
+    bytes_.append(raw, sizeof(T));
+    return *this;
+  }
+  Cdr& text(const std::string& text) {
+    number(static_cast<std::uint32_t>(text.size() + 1));
+    bytes_ += text;
+    bytes_ += '\0';
+    return *this;
+  }
+  Cdr& count(std::size_t n) { return number(static_cast<std::uint32_t>(n)); }
+  Cdr& vector(const Vec3& p) { return number(p.x()).number(p.y()).number(p.z()); }
+  Cdr& time(std::int64_t ns) {
+    constexpr std::int64_t kSecond = 1'000'000'000;
+    return number(static_cast<std::int32_t>(ns / kSecond))
+        .number(static_cast<std::uint32_t>(ns % kSecond));
+  }
+  Cdr& header(std::int64_t ns, const std::string& frame) { return time(ns).text(frame); }
+  Cdr& quaternion(const Mat3& R) {
+    const Eigen::Quaterniond q(R);
+    return number(q.x()).number(q.y()).number(q.z()).number(q.w());
+  }
+  const std::string& bytes() const { return bytes_; }
+
+ private:
+  static constexpr std::size_t kHead = 4;
+  std::string bytes_{"\0\1\0\0", kHead};
+};
+
+// --- Definitions ---------------------------------------------------------------------------------
+
+const std::string kRule(80, '=');
+
+std::string with(const std::string& definition, std::initializer_list<const char*> others) {
+  static const std::map<std::string, std::string> kAll = {
+      {"std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id\n"},
+      {"builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n"},
+      {"builtin_interfaces/Duration", "int32 sec\nuint32 nanosec\n"},
+      {"geometry_msgs/Vector3", "float64 x\nfloat64 y\nfloat64 z\n"},
+      {"geometry_msgs/Point", "float64 x\nfloat64 y\nfloat64 z\n"},
+      {"geometry_msgs/Quaternion", "float64 x\nfloat64 y\nfloat64 z\nfloat64 w\n"},
+      {"geometry_msgs/Pose",
+       "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n"},
+      {"geometry_msgs/Wrench", "geometry_msgs/Vector3 force\ngeometry_msgs/Vector3 torque\n"},
+      {"geometry_msgs/Transform",
+       "geometry_msgs/Vector3 translation\ngeometry_msgs/Quaternion rotation\n"},
+      {"geometry_msgs/TransformStamped",
+       "std_msgs/Header header\nstring child_frame_id\ngeometry_msgs/Transform transform\n"},
+      {"std_msgs/ColorRGBA", "float32 r\nfloat32 g\nfloat32 b\nfloat32 a\n"},
+      {"visualization_msgs/Marker",
+       "std_msgs/Header header\nstring ns\nint32 id\nint32 type\nint32 action\n"
+       "geometry_msgs/Pose pose\ngeometry_msgs/Vector3 scale\nstd_msgs/ColorRGBA color\n"
+       "builtin_interfaces/Duration lifetime\nbool frame_locked\ngeometry_msgs/Point[] points\n"
+       "std_msgs/ColorRGBA[] colors\nstring text\nstring mesh_resource\n"
+       "bool mesh_use_embedded_materials\n"}};
+  std::string out = definition;
+  for (const char* name : others) out += kRule + "\nMSG: " + name + "\n" + kAll.at(name);
+  return out;
+}
+
+/// A field of an .lcm struct.
+struct Field {
+  std::string type, name, comment;
+  int count = 0;  // [-] of an array; 0: a single one
+};
+
+std::vector<Field> fieldsOf(const std::string& lcm) {
+  std::vector<Field> out;
+  std::istringstream in(lcm);
+  std::string line;
+  bool inside = false;
+  while (std::getline(in, line)) {
+    const std::size_t slashes = line.find("//");
+    std::string code = line.substr(0, slashes);
+    const std::string comment = slashes == std::string::npos ? "" : line.substr(slashes + 2);
+    if (code.find("struct ") != std::string::npos) inside = true;
+    const std::size_t end = code.find(';');
+    if (!inside || end == std::string::npos || code.rfind("package", 0) == 0) continue;
+    std::istringstream words(code.substr(0, end));
+    Field field;
+    words >> field.type >> field.name;
+    field.comment = comment;
+    if (const std::size_t open = field.name.find('['); open != std::string::npos) {
+      field.count = std::stoi(field.name.substr(open + 1));
+      field.name.erase(open);
+    }
+    out.push_back(field);
+  }
+  return out;
+}
+
+struct Type {
+  const char* ros;
+  std::size_t size;  // [B]
+};
+const std::map<std::string, Type> kTypes = {{"int8_t", {"int8", 1}},   {"int16_t", {"int16", 2}},
+                                            {"int32_t", {"int32", 4}}, {"int64_t", {"int64", 8}},
+                                            {"float", {"float32", 4}}, {"double", {"float64", 8}},
+                                            {"boolean", {"bool", 1}}};
+
+const std::string& definitionOf(const std::string& type) { return kLcmDefinitions.at(type); }
+
+std::string rosFields(const std::vector<Field>& fields) {
+  std::string out;
+  for (const Field& f : fields) {
+    const auto type = kTypes.find(f.type);
+    const std::string name = type == kTypes.end() ? "ves_msgs/Header" : type->second.ros;
+    out += fmt::format("{}{} {}{}\n", name, f.count ? fmt::format("[{}]", f.count) : "", f.name,
+                       f.comment.empty() ? "" : "  #" + f.comment);
+  }
+  return out;
+}
+
+/// Big-endian fields behind each other, as LCM has them.
+class LcmBytes {
+ public:
+  LcmBytes(const std::vector<std::uint8_t>& bytes, std::size_t at) : bytes_(bytes), at_(at) {}
+
+  bool copy(const std::vector<Field>& fields, Cdr& to) {
+    for (const Field& f : fields) {
+      const auto type = kTypes.find(f.type);
+      for (int i = 0; i < std::max(1, f.count); ++i)
+        if (type == kTypes.end() ? !copy(fieldsOf(definitionOf(f.type)), to)
+                                 : !copy(type->second.size, to))
+          return false;
+    }
+    return true;
+  }
+  bool done() const { return at_ == bytes_.size(); }
+
+ private:
+  bool copy(std::size_t size, Cdr& to) {
+    if (size > bytes_.size() - at_) return false;
+    std::uint64_t value = 0;
+    for (std::size_t i = 0; i < size; ++i) value = value << 8 | bytes_[at_++];
+    if (size == 1) to.number(static_cast<std::uint8_t>(value));
+    if (size == 2) to.number(static_cast<std::uint16_t>(value));
+    if (size == 4) to.number(static_cast<std::uint32_t>(value));
+    if (size == 8) to.number(value);
+    return true;
+  }
+  const std::vector<std::uint8_t>& bytes_;
+  std::size_t at_;
+};
+
+/// state_t -> State
+std::string camel(const std::string& type) {
+  std::string out;
+  bool up = true;
+  for (const char letter : type.substr(0, type.size() - 2)) {
+    if (letter == '_') {
+      up = true;
+      continue;
+    }
+    out += up ? static_cast<char>(std::toupper(letter)) : letter;
+    up = false;
+  }
+  return out;
+}
+
+// --- The run -------------------------------------------------------------------------------------
+
+class Run {
+ public:
+  Run(const Series& series, const std::string& log, const std::string& file)
+      : series_(series),
+        experiment_(series.experiment),
+        log_(log),
+        out_(file, "ros2", "ves " + series.version),
+        base_(basePoses(series)) {}
+
+  void write() {
+    open();
+    for (const Row& row : series_.rows) rows_[row.state.header.sequence] = &row;
+    Damage damage;  // told when the series was read
+    LogReader reader(log_, &damage);
+    LogEvent event;
+    bool first = true;
+    while (reader.next(event)) {
+      const std::int64_t now = event.time_us * 1000;
+      if (std::exchange(first, false)) begin(now);
+      message(event, now);
+      if (event.channel != channel::kState) continue;
+      const auto state = event.as<state_t>();
+      const auto row = state ? rows_.find(state->header.sequence) : rows_.end();
+      if (row != rows_.end() && seen_.insert(row->first).second) tick(*row->second, now);
+    }
+    out_.attach(experiment_.name + ".yaml", "application/yaml", experiment_.resolved);
+    out_.describe("ves", {{"configuration_hash", experiment_.hash},
+                          {"version", series_.version},
+                          {"scenario", experiment_.name}});
+    out_.finish();
+  }
+
+ private:
+  std::uint16_t channel(const std::string& topic, const std::string& schema,
+                        const std::string& text) {
+    return out_.addChannel(topic, "cdr", schema, "ros2msg", text);
+  }
+
+  void open() {
+    const std::string transforms =
+        with("geometry_msgs/TransformStamped[] transforms\n",
+             {"geometry_msgs/TransformStamped", "std_msgs/Header", "builtin_interfaces/Time",
+              "geometry_msgs/Transform", "geometry_msgs/Vector3", "geometry_msgs/Quaternion"});
+    tf_ = channel("/tf", "tf2_msgs/msg/TFMessage", transforms);
+    tf_static_ = channel("/tf_static", "tf2_msgs/msg/TFMessage", transforms);
+    description_ = channel("/robot_description", "std_msgs/msg/String", "string data\n");
+    joints_ = channel("/joint_states", "sensor_msgs/msg/JointState",
+                      with("std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] "
+                           "velocity\nfloat64[] effort\n",
+                           {"std_msgs/Header", "builtin_interfaces/Time"}));
+    wrench_ = channel("/wrench", "geometry_msgs/msg/WrenchStamped",
+                      with("std_msgs/Header header\ngeometry_msgs/Wrench wrench\n",
+                           {"std_msgs/Header", "builtin_interfaces/Time", "geometry_msgs/Wrench",
+                            "geometry_msgs/Vector3"}));
+    legs_ =
+        channel("/legs", "visualization_msgs/msg/MarkerArray",
+                with("visualization_msgs/Marker[] markers\n",
+                     {"visualization_msgs/Marker", "std_msgs/Header", "builtin_interfaces/Time",
+                      "builtin_interfaces/Duration", "geometry_msgs/Pose", "geometry_msgs/Point",
+                      "geometry_msgs/Quaternion", "geometry_msgs/Vector3", "std_msgs/ColorRGBA"}));
+    words_ = channel("/log", "rcl_interfaces/msg/Log",
+                     with("builtin_interfaces/Time stamp\nuint8 level\nstring name\nstring "
+                          "msg\nstring file\nstring function\nuint32 line\n",
+                          {"builtin_interfaces/Time"}));
+    for (const auto& [name, type] :
+         std::map<std::string, std::string>{{ves::channel::kState, "state_t"},
+                                            {ves::channel::kSample, "sample_t"},
+                                            {ves::channel::kLegCommand, "leg_command_t"},
+                                            {ves::channel::kTruth, "truth_t"},
+                                            {ves::channel::kTiming, "timing_t"},
+                                            {ves::channel::kOperator, "operator_t"},
+                                            {ves::channel::kRobot, "robot_command_t"}}) {
+      std::string topic = "/ves/" + type.substr(0, type.size() - 2);
+      own_[name] = {
+          channel(topic, "ves_msgs/msg/" + camel(type), ros2Definition(definitionOf(type))),
+          definitionOf(type)};
+    }
+  }
+
+  void message(const LogEvent& event, std::int64_t now) {
+    const auto own = own_.find(event.channel);
+    if (own == own_.end()) return;
+    const std::string cdr = cdrOf(own->second.second, event.data);
+    if (!cdr.empty()) out_.write(own->second.first, now, cdr);
+  }
+
+  struct Stamped {
+    std::string parent, child;
+    Transform X;
+  };
+  void transforms(std::uint16_t to, std::int64_t now, const std::vector<Stamped>& all) {
+    Cdr cdr;
+    cdr.count(all.size());
+    for (const Stamped& one : all)
+      cdr.header(now, one.parent).text(one.child).vector(one.X.p).quaternion(one.X.R);
+    out_.write(to, now, cdr.bytes());
+  }
+
+  /// The robot's frames in their parents', on the platform or on its ghost: those that move, or
+  /// those that do not.
+  void robotFrames(const JointVector& q, bool moving, const std::string& prefix,
+                   std::vector<Stamped>& out) const {
+    const std::vector<NamedFrame>& frames = experiment_.robot.frames;
+    const LinkPoses X_L0L = linkPoses(experiment_.plant.payload.robot, q);
+    for (const NamedFrame& f : frames) {
+      if (f.joint.empty() == moving) continue;
+      if (f.parent < 0) {
+        out.push_back({prefix + "platform", prefix + f.name, experiment_.plant.payload.X_PL0()});
+        continue;
+      }
+      const NamedFrame& parent = frames[static_cast<std::size_t>(f.parent)];
+      out.push_back(
+          {prefix + parent.name, prefix + f.name, inverse(parent.pose(X_L0L)) * f.pose(X_L0L)});
+    }
+  }
+
+  void begin(std::int64_t now) {
+    std::vector<Stamped> fixed;
+    for (const char* prefix : {"", "ghost/"})
+      robotFrames(experiment_.plant.initial_joints, false, prefix, fixed);
+    transforms(tf_static_, now, fixed);
+    const Value* robot = experiment_.document.find("robot");
+    if (const Value* urdf = robot ? robot->find("urdf_text") : nullptr)
+      out_.write(description_, now, Cdr().text(urdf->text).bytes());
+  }
+
+  void tick(const Row& row, std::int64_t now) {
+    const Geometry& geometry = experiment_.plant.geometry;
+    const Vec6 x =
+        row.hasTruePose() ? Vec6(Vec6::Map(row.truth.x)) : Vec6(Vec6::Map(row.state.x_measured));
+    const Transform X_IP = geometry.fromHome(Pose::from(x));
+    const JointVector q = JointVector::Map(row.has_truth ? row.truth.q : row.sample.q);
+    std::vector<Stamped> moving = {{"inertial", "platform", X_IP}};
+    robotFrames(q, true, "", moving);
+    if (const auto base = base_.find(row.state.header.sequence); base != base_.end()) {
+      moving.push_back({"inertial", "ghost/platform", geometry.fromHome(Pose::from(base->second))});
+      robotFrames(q, true, "ghost/", moving);
+    }
+    transforms(tf_, now, moving);
+
+    const std::vector<std::string>& names = experiment_.robot.joint_names;
+    Cdr joints;
+    joints.header(now, "").count(names.size());
+    for (const std::string& name : names) joints.text(name);
+    joints.count(names.size());
+    for (std::size_t i = 0; i < names.size(); ++i) joints.number(q(static_cast<Eigen::Index>(i)));
+    joints.count(row.has_truth ? names.size() : 0);
+    if (row.has_truth)
+      for (std::size_t i = 0; i < names.size(); ++i) joints.number(row.truth.q_dot[i]);
+    joints.count(0);
+    out_.write(joints_, now, joints.bytes());
+
+    // Admittance control's input, in the axes of the frame that it is shown at.
+    const Vec6 W = Vec6::Map(row.state.dynamic);
+    out_.write(wrench_, now,
+               Cdr()
+                   .header(now, "platform")
+                   .vector(X_IP.R.transpose() * W.head<3>())
+                   .vector(X_IP.R.transpose() * W.tail<3>())
+                   .bytes());
+    legs(X_IP, now);
+    words(row, now);
+  }
+
+  void legs(const Transform& X_IP, std::int64_t now) {
+    constexpr std::int32_t kLineList = 5, kAdd = 0;
+    constexpr double kWidth = 0.03;  // [m]
+    const Geometry& g = experiment_.plant.geometry;
+    Cdr cdr;
+    cdr.count(1).header(now, "inertial").text("legs").number(std::int32_t{0}).number(kLineList);
+    cdr.number(kAdd).vector(Vec3::Zero()).quaternion(Mat3::Identity());
+    cdr.vector(Vec3(kWidth, 0.0, 0.0));
+    for (const float colour : {0.5f, 0.6f, 0.5f, 1.0f}) cdr.number(colour);
+    cdr.time(0).number(std::uint8_t{0}).count(2 * kLegs);
+    for (std::size_t i = 0; i < kLegs; ++i) cdr.vector(g.p_IBi_I[i]).vector(X_IP * g.p_PPi_P[i]);
+    cdr.count(0).text("").text("").number(std::uint8_t{0});
+    out_.write(legs_, now, cdr.bytes());
+  }
+
+  /// A line where the phase, the segment or the cause of a stop changes.
+  void words(const Row& row, std::int64_t now) {
+    constexpr std::uint8_t kInfo = 20, kError = 40;
+    const state_t& s = row.state;
+    const auto kind = static_cast<SegmentKind>(s.kind);
+    std::string said(name(static_cast<Phase>(s.phase)));
+    if (kind != SegmentKind::kCount) said += fmt::format(": {}", name(kind));
+    if (s.phase == static_cast<int>(Phase::kRunning) && s.segment >= 0)
+      said += fmt::format(" ({} of {})", s.segment + 1, experiment_.controller.program.size);
+    const bool stopped = s.cause >= 0 && s.cause < static_cast<int>(Check::kCount);
+    if (stopped) {
+      const auto cause = static_cast<Check>(s.cause);
+      said += fmt::format(", stopped by {}", name(cause));
+    }
+    if (said == said_) return;
+    said_ = said;
+    out_.write(words_, now,
+               Cdr()
+                   .time(now)
+                   .number(stopped ? kError : kInfo)
+                   .text("ves")
+                   .text(said)
+                   .text("")
+                   .text("")
+                   .number(std::uint32_t{0})
+                   .bytes());
+  }
+
+  const Series& series_;
+  const Experiment& experiment_;
+  const std::string log_;
+  McapWriter out_;
+  std::map<std::int64_t, Vec6> base_;
+  std::map<std::int64_t, const Row*> rows_;
+  std::set<std::int64_t> seen_;
+  std::map<std::string, std::pair<std::uint16_t, std::string>> own_;  // by LCM channel
+  std::uint16_t tf_ = 0, tf_static_ = 0, description_ = 0, joints_ = 0, wrench_ = 0, legs_ = 0,
+                words_ = 0;
+  std::string said_;
+};
+
+}  // namespace
+
+std::string ros2Definition(const std::string& lcm) {
+  const std::vector<Field> fields = fieldsOf(lcm);
+  std::string out = rosFields(fields);
+  for (const Field& f : fields)
+    if (!kTypes.count(f.type))
+      return out + kRule + "\nMSG: ves_msgs/Header\n" + rosFields(fieldsOf(definitionOf(f.type)));
+  return out;
+}
+
+std::string cdrOf(const std::string& lcm, const std::vector<std::uint8_t>& message) {
+  constexpr std::size_t kFingerprint = 8;  // [B]
+  if (message.size() < kFingerprint) return {};
+  LcmBytes from(message, kFingerprint);
+  Cdr out;
+  if (!from.copy(fieldsOf(lcm), out) || !from.done()) return {};
+  return out.bytes();
+}
+
+void writeMcap(const Series& series, const std::string& log, const std::string& file) {
+  Run(series, log, file).write();
+}
+
+}  // namespace ves
