@@ -7,12 +7,14 @@
 namespace ves::app {
 
 int collectCommand(int argc, char** argv);
+int compareCommand(int argc, char** argv);
 int controllerCommand(int argc, char** argv);
 int demoCommand(int argc, char** argv);
 int doctorCommand(int argc, char** argv);
 int faultsCommand(int argc, char** argv);
 int identifyCommand(int argc, char** argv);
 int plantCommand(int argc, char** argv);
+int plotCommand(int argc, char** argv);
 int replayCommand(int argc, char** argv);
 int reportCommand(int argc, char** argv);
 int robotCommand(int argc, char** argv);

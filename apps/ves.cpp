@@ -23,6 +23,8 @@ constexpr Command kCommands[] = {
     {"plant", "the machine as a process, by hand", plantCommand},
     {"replay", "a recorded run through the controller again (--check: bit for bit)", replayCommand},
     {"collect", "variables of a log as CSV (--select, --rate, --list)", collectCommand},
+    {"plot", "columns of a log as a picture (--select)", plotCommand},
+    {"compare", "runs side by side: configurations, results, curves", compareCommand},
     {"view", "a recorded run in three dimensions, as one file for a browser", viewCommand},
     {"report", "chapter 4 of the report once more, as one page", reportCommand},
     {"srms", "the flexible base, and the robot on it (chapter 3)", srmsCommand},

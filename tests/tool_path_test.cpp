@@ -16,6 +16,7 @@
 #include "support/robots.hpp"
 #include "ves/analysis/gate.hpp"
 #include "ves/planning/tool_planner.hpp"
+#include "ves/run/robot_orders.hpp"
 #include "ves/run/run.hpp"
 #include "ves/srms/interaction.hpp"
 
@@ -401,6 +402,45 @@ TEST(ToolEvents, RefuseInOneLine) {
               test::experiment("z_sine", {"program=[{move: {}, robot: [{at_s: 0, release: {}}]}]"});
             }).find("robot[0].release: there is no robot"),
             std::string::npos);
+}
+
+// --- Ordered by hand -----------------------------------------------------------------------------
+
+TEST(RobotOrders, APathIsPlannedBesideTheMachineFromWhereTheRobotIs) {
+  const Experiment e = test::experiment("puma_on_table_4_1", {kPose});
+  plant::Truth truth;
+  truth.joints.q = e.plant.initial_joints;
+  truth.P.X = e.plant.geometry.fromHome({});
+  truth.P.X.R = rotation({0.0, 0.0, 0.5});
+  RobotOrders orders(e);
+  ToolOrder order;
+  order.by = true;
+  order.in = ToolOrder::Frame::kInertial;
+  order.position = Vec3(0.05, 0.02, -0.1);
+  order.duration = 2.0;
+  EXPECT_FALSE(orders.take(order, truth));
+  EXPECT_EQ(test::refusal([&] { orders.take(order, truth); }),
+            "another tool path is being planned");
+  const std::optional<RobotAction> planned = orders.done(true);
+  ASSERT_TRUE(planned);
+  const JointTrajectory& path = *std::get<ToolMove>(*planned).joints;
+  const Vec3 way = toolOf(e, path.end()).p - toolOf(e, truth.joints.q).p;
+  EXPECT_LT((truth.P.X.R * e.plant.payload.X_PL0().R * way - *order.position).norm(), 1e-8);
+  EXPECT_FALSE(orders.done(true));
+  order.position = Vec3(0.0, 0.0, 9.0);
+  orders.take(order, truth);
+  EXPECT_NE(test::refusal([&] { orders.done(true); }).find("cannot be reached"), std::string::npos);
+  EXPECT_FALSE(orders.done(true));
+  // What needs no plan begins at once; a load is in the tool's frame.
+  EXPECT_TRUE(orders.take(RobotMove{0, 1.0, 1.0}, truth));
+  EXPECT_TRUE(orders.take(Release{}, truth));
+  const auto grasp = orders.take(HandOrder{{2.0, Vec3(0, 0, 0.1), Mat3::Zero()}}, truth);
+  ASSERT_TRUE(grasp);
+  EXPECT_EQ(std::get<Grasp>(*grasp).link, e.robot.tool()->link);
+  const Experiment none = test::experiment("z_sine");
+  RobotOrders nobody(none);
+  EXPECT_EQ(test::refusal([&] { nobody.take(order, truth); }),
+            "the robot has no tip, want tip: LINK in its configuration");
 }
 
 // --- In hand -------------------------------------------------------------------------------------

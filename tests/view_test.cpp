@@ -103,7 +103,8 @@ TEST(Page, HasAPictureForEveryInstantThatCanBeSeen) {
   const auto shown = recording(run.series, 50.0);
   const std::size_t numbers = shown["pictures"].get<std::string>().size() / 4 * 3 / 4;
   const std::size_t pictures = numbers / shown["width"].get<std::size_t>();
-  EXPECT_NEAR(static_cast<double>(pictures), run.series.rows.size() / 2.0, 2.0);
+  EXPECT_NEAR(static_cast<double>(pictures), 0.5 * static_cast<double>(run.series.rows.size()),
+              2.0);
 }
 
 }  // namespace

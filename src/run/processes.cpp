@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
-#include "robot_orders.hpp"
 #include "ves/realtime/latency.hpp"
 #include "ves/realtime/realtime.hpp"
 #include "ves/run/flight_record.hpp"
+#include "ves/run/robot_orders.hpp"
 #include "ves/run/run.hpp"
 #include "ves/run/run_monitor.hpp"
 #include "ves/transport/channels.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "robot_orders.hpp"
+#include "ves/run/robot_orders.hpp"
 
 #include <chrono>
 

@@ -5,8 +5,8 @@
 
 #include <variant>
 
-#include "ves/planning/tool_planner.hpp"
 #include "ves/planning/moving_robot.hpp"
+#include "ves/planning/tool_planner.hpp"
 
 namespace ves {
 

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// ves compare: what runs differ in, as a table and as pictures.
+#include <fstream>
+
+#include "app.hpp"
+#include "commands.hpp"
+#include "ves/base/coordinates.hpp"
+#include "ves/results/differences.hpp"
+#include "ves/validation/page.hpp"
+
+namespace ves::app {
+namespace {
+
+constexpr std::size_t kMostRuns = 6;
+
+struct ComparedRun {
+  std::string name;
+  Series series;
+};
+
+/// A run's folder, or its log.
+std::string logOf(const std::string& run) {
+  const std::filesystem::path path(run);
+  return std::filesystem::is_directory(path) ? (path / "run.lcmlog").string() : run;
+}
+
+std::vector<std::vector<std::string>> rowsOf(const std::vector<KeyDifference>& differences) {
+  std::vector<std::vector<std::string>> rows;
+  for (const KeyDifference& one : differences) {
+    rows.push_back({one.key});
+    rows.back().insert(rows.back().end(), one.values.begin(), one.values.end());
+  }
+  return rows;
+}
+
+void print(const std::string& title, const std::vector<std::string>& header,
+           const std::vector<std::vector<std::string>>& rows) {
+  fmt::print("{}\n", title);
+  if (rows.empty()) fmt::print("  nothing\n");
+  std::vector<std::size_t> widths(header.size());
+  for (std::size_t i = 0; i < header.size(); ++i) {
+    widths[i] = header[i].size();
+    for (const auto& row : rows) widths[i] = std::max(widths[i], row[i].size());
+  }
+  const auto line = [&](const std::vector<std::string>& cells) {
+    fmt::print("  {:<{}}", cells[0], widths[0]);
+    for (std::size_t i = 1; i < cells.size(); ++i) fmt::print("  {:>{}}", cells[i], widths[i]);
+    fmt::print("\n");
+  };
+  if (!rows.empty()) line(header);
+  for (const auto& row : rows) line(row);
+  fmt::print("\n");
+}
+
+/// A column of all runs, over the time since each began.
+Panel panelOf(const std::vector<ComparedRun>& runs, const std::string& column,
+              const std::string& label, double scale) {
+  Panel panel{"time [s]", label, {}, false};
+  for (std::size_t k = 0; k < runs.size(); ++k) {
+    const std::vector<Column> all = columns(runs[k].series.experiment);
+    const auto at =
+        std::find_if(all.begin(), all.end(), [&](const Column& one) { return one.name == column; });
+    if (at == all.end()) continue;
+    Line line{runs[k].name, {}, {}, static_cast<int>(k % 3), k >= 3};
+    for (const Row& row : runs[k].series.rows) {
+      const double y = at->value(row) * scale;
+      if (!std::isfinite(y)) continue;
+      line.x.push_back(row.t);
+      line.y.push_back(y);
+    }
+    if (!line.x.empty()) panel.lines.push_back(line);
+  }
+  return panel;
+}
+
+}  // namespace
+
+int compareCommand(int argc, char** argv) {
+  CLI::App cli(
+      "Runs side by side: what differs in their configurations and in what came of them, and their "
+      "curves over each other on a page.",
+      "ves compare");
+  std::vector<std::string> given;
+  std::string html;
+  cli.add_option("run", given, "folders of runs, or logs")->required()->expected(2, kMostRuns);
+  cli.add_option("--html", html, "a page with the tables and overlaid curves");
+  return run(cli, argc, argv, [&] {
+    std::vector<ComparedRun> runs;
+    std::vector<const Experiment*> experiments;
+    std::vector<nlohmann::ordered_json> summaries;
+    std::vector<std::string> header = {""};
+    ReferenceMotions references;
+    for (const std::string& one : given) {
+      runs.push_back(
+          {std::filesystem::path(one).lexically_normal().string(), readSeries(logOf(one))});
+      printDamage(runs.back().series.damage);
+      header.push_back(runs.back().name);
+    }
+    for (const ComparedRun& one : runs) {
+      experiments.push_back(&one.series.experiment);
+      summaries.push_back(summarise(one.series, resultOf(one.series), references));
+    }
+    const auto configuration = rowsOf(configurationDifferences(experiments)),
+               results = rowsOf(summaryDifferences(summaries));
+    print("configuration", header, configuration);
+    print("results", header, results);
+    if (html.empty()) return kDone;
+
+    Page page;
+    page.section("Configuration");
+    page.table(header, configuration);
+    page.section("Results");
+    page.table(header, results);
+    page.section("Curves");
+    const auto figure = [&](const std::string& caption, const std::vector<Panel>& panels) {
+      if (!panels.front().lines.empty()) page.figure(caption, panels);
+    };
+    for (int half = 0; half < 2; ++half) {
+      std::vector<Panel> pose, wrench;
+      for (int i = 3 * half; i < 3 * half + 3; ++i) {
+        const Coordinate& c = coordinate(i);
+        pose.push_back(panelOf(runs, fmt::format("{}_actual_{}", c.name, c.unit),
+                               fmt::format("{} [{}]", c.name, c.shown_unit), c.shown));
+        const WrenchComponent& w = wrenchComponent(i);
+        wrench.push_back(panelOf(runs, fmt::format("{}_dynamic_{}", w.name, w.unit),
+                                 fmt::format("{} [{}]", w.name, w.shown_unit), 1.0));
+      }
+      figure(half ? "Attitude of the platform." : "Position of the platform, from home.", pose);
+      figure(
+          half ? "Moment that admittance control feels." : "Force that admittance control feels.",
+          wrench);
+    }
+    std::ofstream out(html, std::ios::binary);
+    out << page.html("Runs side by side", "");
+    out.close();
+    if (!out) throw InputError(fmt::format("--html {}: {}", html, std::strerror(errno)));
+    return kDone;
+  });
+}
+
+}  // namespace ves::app

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// ves plot: columns of a recorded run as a picture.
+#include <fstream>
+
+#include "app.hpp"
+#include "commands.hpp"
+#include "ves/results/figure.hpp"
+#include "ves/results/series.hpp"
+
+namespace ves::app {
+namespace {
+
+/// What a column's name ends with: "m", "n", "rad_per_s".
+std::string unitOf(const std::string& name) {
+  static const char* const kUnits[] = {"m_per_s2", "rad_per_s2", "m_per_s", "rad_per_s",
+                                       "count",    "bits",       "rad",     "nm",
+                                       "m",        "n",          "c",       "s"};
+  for (const char* unit : kUnits) {
+    const std::string end = std::string("_") + unit;
+    if (name.size() > end.size() && name.compare(name.size() - end.size(), end.size(), end) == 0)
+      return unit;
+  }
+  return "";
+}
+
+}  // namespace
+
+int plotCommand(int argc, char** argv) {
+  CLI::App cli("Columns of a recorded run as a picture, those of one unit in one panel.",
+               "ves plot");
+  std::string log, out = "plot.svg";
+  std::vector<std::string> select;
+  double from = 0.0, duration = HUGE_VAL;
+  cli.add_option("log", log, "LCM event log of a run")->required();
+  cli.add_option("--select", select, "columns, or beginnings of their names (ves collect --list)")
+      ->required();
+  cli.add_option("--from", from, "[s] since the first tick")->check(inRange(0.0, 1e9));
+  cli.add_option("--duration", duration, "[s]; to the end by default")->check(inRange(0.0, 1e9));
+  cli.add_option("--out", out, "SVG file")->capture_default_str();
+  return run(cli, argc, argv, [&] {
+    constexpr std::size_t kMostPanels = 8;
+    const Series series = readSeries(log);
+    printDamage(series.damage);
+    std::vector<bool> used(select.size(), false);
+    std::vector<std::pair<std::string, Panel>> panels;  // by unit
+    for (const Column& column : columns(series.experiment)) {
+      if (column.name == "t_s" || !selected(column.name, select, used)) continue;
+      const std::string unit = unitOf(column.name);
+      auto at = std::find_if(panels.begin(), panels.end(),
+                             [&](const auto& one) { return one.first == unit; });
+      if (at == panels.end())
+        at = panels.insert(at, {unit, {"time [s]", unit.empty() ? "-" : unit, {}, false}});
+      std::vector<Line>& lines = at->second.lines;
+      Line line{column.name, {}, {}, static_cast<int>(lines.size() % 3), lines.size() >= 3};
+      for (const Row& row : series.rows) {
+        const double y = column.value(row);
+        if (row.t < from || row.t > from + duration || !std::isfinite(y)) continue;
+        line.x.push_back(row.t);
+        line.y.push_back(y);
+      }
+      if (!line.x.empty()) lines.push_back(line);
+    }
+    for (std::size_t i = 0; i < select.size(); ++i)
+      if (!used[i])
+        throw InputError(fmt::format(
+            "--select {}: no column begins so; ves collect --list names them", select[i]));
+    std::vector<Panel> all;
+    for (const auto& [unit, panel] : panels)
+      if (!panel.lines.empty()) all.push_back(panel);
+    if (all.empty()) throw InputError("--select: the columns have no number in that time");
+    if (all.size() > kMostPanels)
+      throw InputError(fmt::format("--select: {} units, want at most {}", all.size(), kMostPanels));
+    std::ofstream file(out, std::ios::binary);
+    file << svg(all);
+    file.close();
+    if (!file) throw InputError(fmt::format("--out {}: {}", out, std::strerror(errno)));
+    fmt::print("{}\n", out);
+    return kDone;
+  });
+}
+
+}  // namespace ves::app

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// What two runs differ in.
+#include <gtest/gtest.h>
+
+#include "support/rig.hpp"
+#include "ves/results/differences.hpp"
+
+namespace ves {
+namespace {
+
+Experiment ramp(const std::vector<std::string>& set = {}) {
+  std::vector<std::string> all = {
+      "program=[{move: {}}, {trajectory: {duration_s: 1, z: {ramp: {to_m: 0.02}}}}]"};
+  all.insert(all.end(), set.begin(), set.end());
+  return test::experiment("puma_on_table_4_1", all);
+}
+
+std::string text(const std::vector<KeyDifference>& differences) {
+  std::string out;
+  for (const KeyDifference& one : differences) {
+    out += one.key;
+    for (const std::string& value : one.values) out += " " + value;
+    out += "\n";
+  }
+  return out;
+}
+
+TEST(Differences, NameTheLeavesThatWereChanged) {
+  const Experiment a = ramp(), b = ramp({"seed=9", "robot.joints_deg_or_m=[0, -80, 90, 0, 0, 0]"}),
+                   c = ramp({"safety.translation_m=0.3"});
+  EXPECT_EQ(text(configurationDifferences({&a, &a})), "");
+  EXPECT_EQ(text(configurationDifferences({&a, &b})),
+            "seed 1 9\nrobot.joints_deg_or_m[1] -90 -80\n");
+  EXPECT_EQ(configurationDifferences({&a, &b, &c}).size(), 3u);
+  // Long texts are told apart, not shown.
+  Experiment d = a;
+  d.document.find("robot")->find("urdf_text")->text += " ";
+  const auto of_urdf = configurationDifferences({&a, &d});
+  ASSERT_EQ(of_urdf.size(), 1u);
+  EXPECT_EQ(of_urdf[0].key, "robot.urdf_text");
+  EXPECT_LT(of_urdf[0].values[0].size(), 60u);
+}
+
+TEST(Differences, OfWhatCameOfRuns) {
+  ReferenceMotions references;
+  const auto summary = [&](const Experiment& e) {
+    const RecordedRun run = recordLockstep(e);
+    return summarise(run.series, resultOf(run.series), references);
+  };
+  const auto first = summary(ramp());
+  EXPECT_EQ(text(summaryDifferences({first, summary(ramp())})), "");
+  const auto other = summary(
+      ramp({"program=[{move: {}}, {trajectory: {duration_s: 1, z: {ramp: {to_m: 0.03}}}}]"}));
+  const auto differences = summaryDifferences({first, other});
+  const auto at =
+      std::find_if(differences.begin(), differences.end(),
+                   [](const KeyDifference& one) { return one.key == "z_peak_to_peak_m"; });
+  ASSERT_NE(at, differences.end());
+  EXPECT_NEAR(std::stod(at->values[0]), 0.02, 1e-3);
+  EXPECT_NEAR(std::stod(at->values[1]), 0.03, 1e-3);
+}
+
+TEST(Differences, ALogTellsHowItsRunEnded) {
+  for (const Experiment& e :
+       {ramp(),
+        ramp({"program=[{trajectory: {duration_s: 2}, faults: [{at_s: 0.5, duration_s: 1, "
+              "fault: floor_mat}]}]"}),
+        ramp({"program=[{move: {}}, {admittance: {duration_s: 1}}]"})}) {
+    const RecordedRun run = recordLockstep(e);
+    const RunResult told = resultOf(run.series);
+    EXPECT_EQ(told.phase, run.result.phase);
+    EXPECT_EQ(told.cause, run.result.cause);
+    EXPECT_EQ(told.cause_tick, run.result.cause_tick);
+    EXPECT_EQ(told.aborted, run.result.aborted);
+    EXPECT_EQ(told.ticks, run.result.ticks);
+    EXPECT_NEAR(told.simulated, run.result.simulated, 1e-9);
+  }
+}
+
+}  // namespace
+}  // namespace ves
