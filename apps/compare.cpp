@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // ves compare: what runs differ in, as a table and as pictures.
+#include <fmt/ranges.h>
+
 #include <fstream>
 
 #include "app.hpp"
@@ -132,7 +134,8 @@ int compareCommand(int argc, char** argv) {
           wrench);
     }
     std::ofstream out(html, std::ios::binary);
-    out << page.html("Runs side by side", "");
+    out << page.html("Runs side by side",
+                     fmt::format("{}", fmt::join(header.begin() + 1, header.end(), ", ")));
     out.close();
     if (!out) throw InputError(fmt::format("--html {}: {}", html, std::strerror(errno)));
     return kDone;

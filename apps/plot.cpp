@@ -50,7 +50,8 @@ int plotCommand(int argc, char** argv) {
       auto at = std::find_if(panels.begin(), panels.end(),
                              [&](const auto& one) { return one.first == unit; });
       if (at == panels.end())
-        at = panels.insert(at, {unit, {"time [s]", unit.empty() ? "-" : unit, {}, false}});
+        at = panels.insert(
+            at, {unit, {"time [s]", unit.empty() ? "-" : fmt::format("[{}]", unit), {}, false}});
       std::vector<Line>& lines = at->second.lines;
       Line line{column.name, {}, {}, static_cast<int>(lines.size() % 3), lines.size() >= 3};
       for (const Row& row : series.rows) {
@@ -72,7 +73,7 @@ int plotCommand(int argc, char** argv) {
     if (all.size() > kMostPanels)
       throw InputError(fmt::format("--select: {} units, want at most {}", all.size(), kMostPanels));
     std::ofstream file(out, std::ios::binary);
-    file << svg(all);
+    file << svgFile(all);
     file.close();
     if (!file) throw InputError(fmt::format("--out {}: {}", out, std::strerror(errno)));
     fmt::print("{}\n", out);

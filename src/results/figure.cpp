@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "thinning.hpp"
+#include "ves/base/errors.hpp"
 #include "ves/results/gnuplot.hpp"
 
 namespace ves {
@@ -99,6 +100,16 @@ std::string svg(const std::vector<Panel>& panels) {
                                 {"stroke='rgb(  0, 158, 115)'", "class=\"c2\""},
                                 {"stroke='rgb(128, 128, 128)'", ""}};
   for (const auto& [from, to] : ink) replaceAll(out, from, to);
+  return out;
+}
+
+std::string svgFile(const std::vector<Panel>& panels) {
+  std::string out = svg(panels);
+  if (out.rfind("<svg", 0) != 0) throw InputError("gnuplot has drawn nothing; is it installed?");
+  out.insert(out.find('>') + 1,
+             "\n<style>.ink { stroke: #1b1f24; } .ink-text { fill: #1b1f24; } .gridline { stroke: "
+             "#d0d7de; } .c0 { stroke: #0067a8; } .c1 { stroke: #c14e00; } .c2 { stroke: #00805e; "
+             "}</style>\n<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>");
   return out;
 }
 

@@ -124,15 +124,19 @@ std::string Page::html(const std::string& title, const std::string& lead) const 
           "<tr><td><a href=\"#s{}\">{}</a></td><td>{}</td><td>{}</td><td>{}</td></tr>\n", i,
           escaped(c.where), escaped(c.says), escaped(c.reached), badge(c.verdict));
   }
+  std::string claims_table;
+  if (!all.empty())
+    claims_table = fmt::format(
+        "<p>{} claims: {}.</p>\n<div "
+        "class=\"scroll\"><table><thead><tr><th>report</th><th>claim</th>"
+        "<th>reached</th><th>verdict</th></tr></thead><tbody>\n{}</tbody></table></div>\n",
+        all.size(), counts, rows);
   return fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
       "<title>{0}</title>\n<style>{1}</style></head>\n<body>\n<h1>{0}</h1>\n<p>{2}</p>\n"
-      "<p>{3} claims: {4}.</p>\n<div "
-      "class=\"scroll\"><table><thead><tr><th>report</th><th>claim</th>"
-      "<th>reached</th><th>verdict</th></tr></thead><tbody>\n{5}</tbody></table></div>\n{6}"
-      "</body></html>\n",
-      escaped(title), kStyle, escaped(lead), all.size(), counts, rows, body);
+      "{3}{4}</body></html>\n",
+      escaped(title), kStyle, escaped(lead), claims_table, body);
 }
 
 }  // namespace ves

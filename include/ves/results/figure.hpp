@@ -26,4 +26,7 @@ struct Panel {
 /// page colours, so that it is read on light and dark.
 std::string svg(const std::vector<Panel>& panels);
 
+/// The same as a file that needs no page around it. Throws InputError when nothing is drawn.
+std::string svgFile(const std::vector<Panel>& panels);
+
 }  // namespace ves
