@@ -12,8 +12,8 @@
 #include <iterator>
 
 #include "support/refusal.hpp"
+#include "ves/view/lcm_definition.hpp"
 #include "ves/view/mcap.hpp"
-#include "ves/view/ros2.hpp"
 
 namespace ves {
 namespace {
@@ -145,7 +145,7 @@ struct thing_t {
 )";
 
 TEST(Ros2, ADefinitionKeepsUnitsAndOrder) {
-  const std::string text = ros2Definition(kLcm);
+  const std::string text = LcmDefinition(kLcm).ros2();
   EXPECT_EQ(
       text.rfind("ves_msgs/Header header  # who\nint8 small  # [-] so\nfloat64[2] far  # [m]; "
                  "both\nint32 last\n" +
@@ -166,7 +166,7 @@ TEST(Ros2, BytesAreTurnedAndAligned) {
   for (const int byte : {0xc0, 0x00, 0, 0, 0, 0, 0, 0})
     lcm.push_back(static_cast<std::uint8_t>(byte));                                    // -2.0
   for (const int byte : {0, 0, 1, 0}) lcm.push_back(static_cast<std::uint8_t>(byte));  // 256
-  const std::string cdr = cdrOf(kLcm, lcm);
+  const std::string cdr = LcmDefinition(kLcm).cdr(lcm);
   ASSERT_EQ(cdr.size(), 4u + 32u + 8u + 16u + 4u);
   EXPECT_EQ(cdr.substr(0, 4), std::string("\0\1\0\0", 4));
   for (std::size_t i = 0; i < 4; ++i)
@@ -176,9 +176,9 @@ TEST(Ros2, BytesAreTurnedAndAligned) {
   EXPECT_EQ(number<double>(cdr, 52), -2.0);
   EXPECT_EQ(number<std::int32_t>(cdr, 60), 256);
   lcm.push_back(0);
-  EXPECT_EQ(cdrOf(kLcm, lcm), "");
+  EXPECT_EQ(LcmDefinition(kLcm).cdr(lcm), "");
   lcm.resize(20);
-  EXPECT_EQ(cdrOf(kLcm, lcm), "");
+  EXPECT_EQ(LcmDefinition(kLcm).cdr(lcm), "");
 }
 
 }  // namespace

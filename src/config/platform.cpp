@@ -11,9 +11,7 @@ namespace {
 
 /// The symmetric matrix of {xx, yy, zz, xy, xz, yz}, that a body can have.
 Mat3 readInertia(Section& s, std::string_view key) {
-  const Eigen::VectorXd i = s.vector(key, 6, -1e7, 1e7);
-  Mat3 I;
-  I << i(0), i(3), i(4), i(3), i(1), i(5), i(4), i(5), i(2);
+  const Mat3 I = inertiaOf(s.vector(key, 6, -1e7, 1e7));
   const double least = symmetricEigenvalues(I)(0);
   if (!(least >= -1e-9 * I.norm()))
     s.fail(key, fmt::format("smallest principal moment {:.4g}, want none below 0", least));

@@ -8,10 +8,6 @@
 
 namespace ves {
 
-double jointUnit(JointType type) { return type == JointType::kRevolute ? kDegree : 1.0; }
-
-const char* jointUnitName(JointType type) { return type == JointType::kRevolute ? "deg" : "m"; }
-
 void requireInLimits(const Section& s, std::string_view key, const UrdfRobot& robot, int joint,
                      double q) {
   const Link& link = robot.model.jointLink(joint);

@@ -21,6 +21,12 @@ void readPlace(Section s, ToolOrder& order) {
   s.finish();
 }
 
+/// [s] after which the controller is told; none: never.
+std::optional<double> readDelay(Section& s) {
+  if (!s.has("told_after_s")) return {};
+  return s.number("told_after_s", 0.0, 1e5);
+}
+
 std::string secondsOf(std::int64_t ns) {
   return fmt::format("{:.9g} s", static_cast<double>(ns) * kSecondPerNanosecond);
 }
@@ -142,8 +148,7 @@ ToolPlanner& RobotEvents::planner(const Section& s) {
 /// X_FL0 of a frame of orders.
 Transform RobotEvents::frameOf(Section& s, const Cue& cue, ToolOrder::Frame frame) {
   const Transform X_PL0 = out_.controller.payload.X_PL0();
-  if (frame == ToolOrder::Frame::kRobot) return {};
-  if (frame == ToolOrder::Frame::kPlatform) return X_PL0;
+  if (frame != ToolOrder::Frame::kInertial) return baseIn(frame, {}, X_PL0);
   const SegmentKind kind = segmentOf(cue).kind;
   if (kind == SegmentKind::kMove || kind == SegmentKind::kTrajectory || kind == SegmentKind::kPath)
     s.fail("tool", fmt::format("in: inertial while a {} leads the platform, want robot or platform",
@@ -158,7 +163,7 @@ Transform RobotEvents::frameOf(Section& s, const Cue& cue, ToolOrder::Frame fram
                   "is commanded: [{:.4g}] m, [{:.4g}] rad",
                   cue.segment, secondsOf(cue.after), fmt::join(x.data(), x.data() + 3, ", "),
                   fmt::join(x.data() + 3, x.data() + 6, ", ")));
-  return out_.controller.geometry.fromHome(*stands_) * X_PL0;
+  return baseIn(frame, out_.controller.geometry.fromHome(*stands_), X_PL0);
 }
 
 void RobotEvents::readTool(Section& s, const Cue& cue) {
@@ -184,8 +189,7 @@ void RobotEvents::readGrasp(Section& s, const Cue& cue) {
   if (holds_) s.fail("grasp", "the robot has something in hand, want a release before");
   holds_ = true;
   Section grasp = s.section("grasp");
-  std::optional<double> delay;
-  if (grasp.has("told_after_s")) delay = grasp.number("told_after_s", 0.0, 1e5);
+  const std::optional<double> delay = readDelay(grasp);
   const RigidBody body = combine(RigidBody{}, frame.X_link, readBody(grasp));
   moved(cue, Grasp{frame.link, body}, sinceStart(cue));
   tell(s, cue, delay, {cue, frame.link, body});
@@ -195,8 +199,7 @@ void RobotEvents::readRelease(Section& s, const Cue& cue) {
   if (!holds_) s.fail("release", "the robot has nothing in hand");
   holds_ = false;
   Section release = s.section("release");
-  std::optional<double> delay;
-  if (release.has("told_after_s")) delay = release.number("told_after_s", 0.0, 1e5);
+  const std::optional<double> delay = readDelay(release);
   release.finish();
   moved(cue, Release{}, sinceStart(cue));
   tell(s, cue, delay, {cue, -1, {}});

@@ -58,7 +58,7 @@ bool JointPaths::move(const RobotMove& move, std::int64_t now) noexcept {
 
 bool JointPaths::follow(std::shared_ptr<const JointTrajectory> trajectory,
                         std::int64_t now) noexcept {
-  constexpr std::int64_t kAtOnce = 1000;  // [ns]
+  constexpr std::int64_t kAtOnce = 1000;  // [ns] what ends by then has ended, however it is rounded
   if (!trajectory || moving(now + kAtOnce)) return false;
   const JointVector off = at(now).q - trajectory->start();
   for (int i = 0; i < joints_; ++i)

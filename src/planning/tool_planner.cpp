@@ -80,6 +80,14 @@ std::unique_ptr<KDL::Path> arcOf(const Transform& from, const Vec3& via, const T
 
 }  // namespace
 
+Transform baseIn(ToolOrder::Frame frame, const Transform& X_IP, const Transform& X_PL0) {
+  switch (frame) {
+    case ToolOrder::Frame::kPlatform: return X_PL0;
+    case ToolOrder::Frame::kInertial: return X_IP * X_PL0;
+    default: return {};
+  }
+}
+
 ToolGoal goalOf(const ToolOrder& order, const Transform& X_FL0, const Transform& X_L0T) {
   const Transform X_FT = X_FL0 * X_L0T, X_L0F = inverse(X_FL0);
   const Vec3 from = order.by ? X_FT.p : Vec3(Vec3::Zero());
@@ -288,11 +296,10 @@ class ToolPlanner::Impl {
     const JointVector& q = state.q;
     if (const std::optional<int> i = outside(q)) {
       const Link& l = linkOf(*i);
-      const bool turns = l.type == JointType::kRevolute;
-      const double unit = turns ? kDegree : 1.0;
+      const double unit = jointUnit(l.type);
       throw InputError(fmt::format(
           "at {:.2f} s joint '{}' would be at {:.6g} {}, want [{:.6g}, {:.6g}]", t, nameOf(*i),
-          q(*i) / unit, turns ? "deg" : "m", l.lower / unit, l.upper / unit));
+          q(*i) / unit, jointUnitName(l.type), l.lower / unit, l.upper / unit));
     }
     Eigen::MatrixXd J = jacobian(q);
     J.topRows<3>() /= reach_;
@@ -310,11 +317,11 @@ class ToolPlanner::Impl {
     }
     for (const int i : joints_)
       if (!(std::abs(state.q_dot(i)) <= fastest_(i))) {
-        const bool turns = linkOf(i).type == JointType::kRevolute;
-        const double unit = turns ? kDegree : 1.0;
-        throw InputError(fmt::format(
-            "at {:.2f} s joint '{}' would move at {:.4g} {}/s, want at most {:.4g}", t, nameOf(i),
-            std::abs(state.q_dot(i)) / unit, turns ? "deg" : "m", fastest_(i) / unit));
+        const JointType type = linkOf(i).type;
+        throw InputError(
+            fmt::format("at {:.2f} s joint '{}' would move at {:.4g} {}/s, want at most {:.4g}", t,
+                        nameOf(i), std::abs(state.q_dot(i)) / jointUnit(type), jointUnitName(type),
+                        fastest_(i) / jointUnit(type)));
       }
   }
 

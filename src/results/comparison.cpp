@@ -102,6 +102,18 @@ std::optional<Emulation> emulation(const Series& series, ReferenceMotions& refer
   return out;
 }
 
+std::map<std::int64_t, Vec6> basePoses(const Series& series, const Emulation& emulation) {
+  std::map<std::int64_t, Vec6> out;
+  std::optional<std::int64_t> first;
+  eachTick(series, [&](const Row& row, double) {
+    const std::int64_t tick = row.state.header.sequence;
+    if (!first) first = tick;
+    const auto k = static_cast<std::size_t>(tick - *first);  // late ticks are missing
+    if (k < emulation.base.x.size()) out[tick] = emulation.base.x[k] + emulation.rest;
+  });
+  return out;
+}
+
 Motion motion(const std::vector<InteractionPoint>& points) {
   Motion out;
   for (const InteractionPoint& p : points) {

@@ -203,14 +203,16 @@ std::vector<Column> columns(const Experiment& experiment) {
                         ? "rad"
                         : "m"),
         [=](const Row& r) { return r.has_sample ? r.sample.q[i] : NAN; });
-  if (experiment.robot.tool())
+  if (experiment.robot.tool()) {
+    const auto whole = std::make_shared<const Experiment>(experiment);
     for (int i = 0; i < 6; ++i)
       add(fmt::format("tool_{}_actual_{}", coordinate(i).name, coordinate(i).unit),
           [=](const Row& r) {
             if (!r.hasTruePose()) return static_cast<double>(NAN);
             const JointVector q = JointVector::Map(r.truth.q);
-            return coordinateOf(toolPose(experiment, Vec6::Map(r.truth.x), q), i);
+            return coordinateOf(toolPose(*whole, Vec6::Map(r.truth.x), q), i);
           });
+  }
   addChannels("bias", &state_t::bias);
   addChannels("deviation", &state_t::deviation);
   addChannels("standard_error", &state_t::standard_error);

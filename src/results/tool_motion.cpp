@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <memory>
 
 #include "ves/base/coordinates.hpp"
 
@@ -21,15 +22,16 @@ std::optional<ToolMotion> toolMotion(const Series& series, const std::optional<E
   const Experiment& experiment = series.experiment;
   if (!e || !experiment.robot.tool()) return {};
   ToolMotion out;
-  std::size_t i = 0;
+  const std::map<std::int64_t, Vec6> base = basePoses(series, *e);
+  const Vec6 start = e->base.x.front() + e->rest;
   eachTick(series, [&](const Row& row, double) {
-    if (!row.hasTruePose() || i >= e->base.x.size()) return;
+    const auto at = base.find(row.state.header.sequence);
+    if (!row.hasTruePose() || at == base.end()) return;
     const JointVector q = JointVector::Map(row.truth.q);
-    out.tick.push_back(row.state.header.sequence);
+    out.tick.push_back(at->first);
     out.actual.push_back(toolPose(experiment, Vec6::Map(row.truth.x), q));
-    out.on_base.push_back(toolPose(experiment, e->base.x[i] + e->rest, q));
-    out.at_rest.push_back(toolPose(experiment, e->base.x.front() + e->rest, q));
-    ++i;
+    out.on_base.push_back(toolPose(experiment, at->second, q));
+    out.at_rest.push_back(toolPose(experiment, start, q));
   });
   return out;
 }
@@ -39,14 +41,14 @@ double coordinateOf(const Transform& X_IT, int i) {
 }
 
 std::vector<Column> columnsOf(const ToolMotion& motion) {
-  std::map<std::int64_t, Transform> at;  // by tick
-  for (std::size_t k = 0; k < motion.tick.size(); ++k) at[motion.tick[k]] = motion.on_base[k];
+  const auto at = std::make_shared<std::map<std::int64_t, Transform>>();  // by tick
+  for (std::size_t k = 0; k < motion.tick.size(); ++k) (*at)[motion.tick[k]] = motion.on_base[k];
   std::vector<Column> out;
   for (int i = 0; i < 6; ++i)
     out.push_back({fmt::format("tool_{}_base_{}", coordinate(i).name, coordinate(i).unit),
                    [at, i](const Row& row) {
-                     const auto found = at.find(row.state.header.sequence);
-                     return found == at.end() ? NAN : coordinateOf(found->second, i);
+                     const auto found = at->find(row.state.header.sequence);
+                     return found == at->end() ? NAN : coordinateOf(found->second, i);
                    }});
   return out;
 }

@@ -20,10 +20,7 @@ std::optional<RobotAction> RobotOrders::take(const RobotOrder& order, const plan
     planner_ = std::make_unique<ToolPlanner>(robot.model, frame->link, frame->X_link, robot.fastest,
                                              robot.joint_names);
   const auto& tool = std::get<ToolOrder>(order);
-  const Transform X_PL0 = experiment_.plant.payload.X_PL0();
-  const Transform X_FL0 = tool.in == ToolOrder::Frame::kRobot      ? Transform{}
-                          : tool.in == ToolOrder::Frame::kPlatform ? X_PL0
-                                                                   : truth.P.X * X_PL0;
+  const Transform X_FL0 = baseIn(tool.in, truth.P.X, experiment_.plant.payload.X_PL0());
   const JointVector q = truth.joints.q;
   const ToolGoal goal = goalOf(tool, X_FL0, planner_->pose(q));
   planned_ = std::async(std::launch::async, [this, q, goal] { return planner_->plan(q, goal); });

@@ -298,8 +298,7 @@ std::optional<RobotOrder> handOrder(const robot_command_t& m) noexcept {
   RigidBody body;
   body.mass = m.mass;
   body.p_BoBcm_B = Vec3::Map(m.com);
-  const double* i = m.inertia;
-  body.I_Bcm_B << i[0], i[3], i[4], i[3], i[1], i[5], i[4], i[5], i[2];
+  body.I_Bcm_B = inertiaOf(Vec6::Map(m.inertia));
   bool good = inRange(m.mass, 0.0, kMaxLoad);
   for (const double x : m.com) good = good && inRange(x, -kMaxReach, kMaxReach);
   for (const double x : m.inertia) good = good && inRange(x, -kMaxLoadInertia, kMaxLoadInertia);

@@ -5,57 +5,17 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cstring>
 #include <map>
 #include <set>
-#include <sstream>
 
-#include "ves/base/build.hpp"
-#include "ves/results/evidence.hpp"
+#include "cdr.hpp"
 #include "ves/transport/channels.hpp"
+#include "ves/view/lcm_definition.hpp"
 #include "ves/view/mcap.hpp"
-#include "ves/view/scene.hpp"
 #include "ves/view/sources.hpp"
 
 namespace ves {
 namespace {
-
-// --- CDR, little-endian --------------------------------------------------------------------------
-
-class Cdr {
- public:
-  template <class T>
-  Cdr& number(T value) {
-    while ((bytes_.size() - kHead) % sizeof(T) != 0) bytes_ += '\0';
-    char raw[sizeof(T)];
-    std::memcpy(raw, &value, sizeof(T));
-    bytes_.append(raw, sizeof(T));
-    return *this;
-  }
-  Cdr& text(const std::string& text) {
-    number(static_cast<std::uint32_t>(text.size() + 1));
-    bytes_ += text;
-    bytes_ += '\0';
-    return *this;
-  }
-  Cdr& count(std::size_t n) { return number(static_cast<std::uint32_t>(n)); }
-  Cdr& vector(const Vec3& p) { return number(p.x()).number(p.y()).number(p.z()); }
-  Cdr& time(std::int64_t ns) {
-    constexpr std::int64_t kSecond = 1'000'000'000;
-    return number(static_cast<std::int32_t>(ns / kSecond))
-        .number(static_cast<std::uint32_t>(ns % kSecond));
-  }
-  Cdr& header(std::int64_t ns, const std::string& frame) { return time(ns).text(frame); }
-  Cdr& quaternion(const Mat3& R) {
-    const Eigen::Quaterniond q(R);
-    return number(q.x()).number(q.y()).number(q.z()).number(q.w());
-  }
-  const std::string& bytes() const { return bytes_; }
-
- private:
-  static constexpr std::size_t kHead = 4;
-  std::string bytes_{"\0\1\0\0", kHead};
-};
 
 // --- Definitions ---------------------------------------------------------------------------------
 
@@ -88,91 +48,6 @@ std::string with(const std::string& definition, std::initializer_list<const char
   return out;
 }
 
-/// A field of an .lcm struct.
-struct Field {
-  std::string type, name, comment;
-  int count = 0;  // [-] of an array; 0: a single one
-};
-
-std::vector<Field> fieldsOf(const std::string& lcm) {
-  std::vector<Field> out;
-  std::istringstream in(lcm);
-  std::string line;
-  bool inside = false;
-  while (std::getline(in, line)) {
-    const std::size_t slashes = line.find("//");
-    std::string code = line.substr(0, slashes);
-    const std::string comment = slashes == std::string::npos ? "" : line.substr(slashes + 2);
-    if (code.find("struct ") != std::string::npos) inside = true;
-    const std::size_t end = code.find(';');
-    if (!inside || end == std::string::npos || code.rfind("package", 0) == 0) continue;
-    std::istringstream words(code.substr(0, end));
-    Field field;
-    words >> field.type >> field.name;
-    field.comment = comment;
-    if (const std::size_t open = field.name.find('['); open != std::string::npos) {
-      field.count = std::stoi(field.name.substr(open + 1));
-      field.name.erase(open);
-    }
-    out.push_back(field);
-  }
-  return out;
-}
-
-struct Type {
-  const char* ros;
-  std::size_t size;  // [B]
-};
-const std::map<std::string, Type> kTypes = {{"int8_t", {"int8", 1}},   {"int16_t", {"int16", 2}},
-                                            {"int32_t", {"int32", 4}}, {"int64_t", {"int64", 8}},
-                                            {"float", {"float32", 4}}, {"double", {"float64", 8}},
-                                            {"boolean", {"bool", 1}}};
-
-const std::string& definitionOf(const std::string& type) { return kLcmDefinitions.at(type); }
-
-std::string rosFields(const std::vector<Field>& fields) {
-  std::string out;
-  for (const Field& f : fields) {
-    const auto type = kTypes.find(f.type);
-    const std::string name = type == kTypes.end() ? "ves_msgs/Header" : type->second.ros;
-    out += fmt::format("{}{} {}{}\n", name, f.count ? fmt::format("[{}]", f.count) : "", f.name,
-                       f.comment.empty() ? "" : "  #" + f.comment);
-  }
-  return out;
-}
-
-/// Big-endian fields behind each other, as LCM has them.
-class LcmBytes {
- public:
-  LcmBytes(const std::vector<std::uint8_t>& bytes, std::size_t at) : bytes_(bytes), at_(at) {}
-
-  bool copy(const std::vector<Field>& fields, Cdr& to) {
-    for (const Field& f : fields) {
-      const auto type = kTypes.find(f.type);
-      for (int i = 0; i < std::max(1, f.count); ++i)
-        if (type == kTypes.end() ? !copy(fieldsOf(definitionOf(f.type)), to)
-                                 : !copy(type->second.size, to))
-          return false;
-    }
-    return true;
-  }
-  bool done() const { return at_ == bytes_.size(); }
-
- private:
-  bool copy(std::size_t size, Cdr& to) {
-    if (size > bytes_.size() - at_) return false;
-    std::uint64_t value = 0;
-    for (std::size_t i = 0; i < size; ++i) value = value << 8 | bytes_[at_++];
-    if (size == 1) to.number(static_cast<std::uint8_t>(value));
-    if (size == 2) to.number(static_cast<std::uint16_t>(value));
-    if (size == 4) to.number(static_cast<std::uint32_t>(value));
-    if (size == 8) to.number(value);
-    return true;
-  }
-  const std::vector<std::uint8_t>& bytes_;
-  std::size_t at_;
-};
-
 /// state_t -> State
 std::string camel(const std::string& type) {
   std::string out;
@@ -197,7 +72,9 @@ class Run {
         experiment_(series.experiment),
         log_(log),
         out_(file, "ros2", "ves " + series.version),
-        base_(basePoses(series)) {}
+        emulated_(emulation(series)) {
+    if (emulated_) base_ = basePoses(series, *emulated_);
+  }
 
   void write() {
     open();
@@ -263,16 +140,16 @@ class Run {
                                             {ves::channel::kOperator, "operator_t"},
                                             {ves::channel::kRobot, "robot_command_t"}}) {
       std::string topic = "/ves/" + type.substr(0, type.size() - 2);
-      own_[name] = {
-          channel(topic, "ves_msgs/msg/" + camel(type), ros2Definition(definitionOf(type))),
-          definitionOf(type)};
+      const LcmDefinition definition(kLcmDefinitions.at(type));
+      const std::uint16_t to = channel(topic, "ves_msgs/msg/" + camel(type), definition.ros2());
+      own_.emplace(name, std::pair(to, definition));
     }
   }
 
   void message(const LogEvent& event, std::int64_t now) {
     const auto own = own_.find(event.channel);
     if (own == own_.end()) return;
-    const std::string cdr = cdrOf(own->second.second, event.data);
+    const std::string cdr = own->second.second.cdr(event.data);
     if (!cdr.empty()) out_.write(own->second.first, now, cdr);
   }
 
@@ -401,34 +278,17 @@ class Run {
   const Experiment& experiment_;
   const std::string log_;
   McapWriter out_;
+  std::optional<Emulation> emulated_;
   std::map<std::int64_t, Vec6> base_;
   std::map<std::int64_t, const Row*> rows_;
   std::set<std::int64_t> seen_;
-  std::map<std::string, std::pair<std::uint16_t, std::string>> own_;  // by LCM channel
+  std::map<std::string, std::pair<std::uint16_t, LcmDefinition>> own_;  // by LCM channel
   std::uint16_t tf_ = 0, tf_static_ = 0, description_ = 0, joints_ = 0, wrench_ = 0, legs_ = 0,
                 words_ = 0;
   std::string said_;
 };
 
 }  // namespace
-
-std::string ros2Definition(const std::string& lcm) {
-  const std::vector<Field> fields = fieldsOf(lcm);
-  std::string out = rosFields(fields);
-  for (const Field& f : fields)
-    if (!kTypes.count(f.type))
-      return out + kRule + "\nMSG: ves_msgs/Header\n" + rosFields(fieldsOf(definitionOf(f.type)));
-  return out;
-}
-
-std::string cdrOf(const std::string& lcm, const std::vector<std::uint8_t>& message) {
-  constexpr std::size_t kFingerprint = 8;  // [B]
-  if (message.size() < kFingerprint) return {};
-  LcmBytes from(message, kFingerprint);
-  Cdr out;
-  if (!from.copy(fieldsOf(lcm), out) || !from.done()) return {};
-  return out.bytes();
-}
 
 void writeMcap(const Series& series, const std::string& log, const std::string& file) {
   Run(series, log, file).write();

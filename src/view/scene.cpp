@@ -81,9 +81,9 @@ Scene::Scene(const Experiment& e) : geometry_(e.plant.geometry), payload_(e.plan
                     {"length", payload_.X_PS.p.z()}});
   if (!e.robot.frames.empty()) addRobot();
 
-  const auto six = [&](const std::string& name, const double(state_t::*field)[6]) {
+  const auto addPose = [&](const char* what, const double(state_t::*field)[6]) {
     for (int i = 0; i < 6; ++i)
-      scalars_.push_back({fmt::format(fmt::runtime(name), coordinate(i).name),
+      scalars_.push_back({fmt::format("{}_{}", coordinate(i).name, what),
                           [field, i](const Row& r) { return (r.state.*field)[i]; }});
   };
   const auto add = [&](const char* name, auto value) { scalars_.push_back({name, value}); };
@@ -92,8 +92,8 @@ Scene::Scene(const Experiment& e) : geometry_(e.plant.geometry), payload_(e.plan
   add("segment", [](const Row& r) { return static_cast<double>(r.state.segment); });
   add("kind", [](const Row& r) { return static_cast<double>(r.state.kind); });
   add("cause", [](const Row& r) { return static_cast<double>(r.state.cause); });
-  six("{}_commanded", &state_t::x_desired);
-  six("{}_measured", &state_t::x_measured);
+  addPose("commanded", &state_t::x_desired);
+  addPose("measured", &state_t::x_measured);
   for (int i = 0; i < 6; ++i)
     scalars_.push_back({fmt::format("{}_actual", coordinate(i).name),
                         [i](const Row& r) { return r.hasTruePose() ? r.truth.x[i] : NAN; }});
@@ -202,21 +202,10 @@ std::vector<float> Scene::picture(const Row& row, const std::optional<Vec6>& bas
   return out;
 }
 
-std::map<std::int64_t, Vec6> basePoses(const Series& series) {
-  std::map<std::int64_t, Vec6> out;
-  const std::optional<Emulation> e = emulation(series);
-  if (!e) return out;
-  std::size_t k = 0;
-  eachTick(series, [&](const Row& row, double) {
-    if (k < e->base.x.size()) out[row.state.header.sequence] = e->base.x[k] + e->rest;
-    ++k;
-  });
-  return out;
-}
-
 nlohmann::ordered_json recording(const Series& series, double rate) {
   const Scene scene(series.experiment);
-  const std::map<std::int64_t, Vec6> base = basePoses(series);
+  const std::optional<Emulation> emulated = emulation(series);
+  const auto base = emulated ? basePoses(series, *emulated) : std::map<std::int64_t, Vec6>();
   std::vector<float> numbers;
   double next = -HUGE_VAL;
   for (const Row& row : series.rows) {

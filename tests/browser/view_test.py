@@ -121,7 +121,7 @@ class View(unittest.TestCase):
             tool = pose(get(["tool_x_actual_m", "tool_y_actual_m", "tool_z_actual_m"]),
                         get(["tool_alpha_actual_rad", "tool_beta_actual_rad", "tool_gamma_actual_rad"]))
             q = get([f"joint_{i}_rad" for i in range(1, 7)])
-            mount = pose([0, 0, 0.0957 + 0.0127], [0, 0, 0])
+            mount = pose([0, 0, 0.0957 + 0.0127], [0, 0, 0])  # config/robots/mount.yaml
             due = {"platform": P, "tool": tool}
             for i, X in enumerate(links(ROOT / "config/robots/puma560.urdf", q)):
                 due[f"link{i + 1}"] = P @ mount @ X

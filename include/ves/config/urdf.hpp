@@ -27,10 +27,6 @@ struct NamedFrame {
   Transform pose(const LinkPoses& X_L0L) const { return link < 0 ? X_link : X_L0L[link] * X_link; }
 };
 
-/// Joint values in files: [rad/deg] of one that turns, [1] of one that slides.
-double jointUnit(JointType type);
-const char* jointUnitName(JointType type);  // "deg" | "m"
-
 struct UrdfRobot {
   RobotModel model;
   std::vector<std::string> joint_names;  // of the joint values

@@ -29,13 +29,15 @@ struct ToolOrder {
   bool by = false;               // from where the tool is; otherwise to a pose
   Frame in = Frame::kRobot;      // whose axes and, of a pose, origin
   std::optional<Vec3> position;  // [m]; none: as it is
-  std::optional<Vec3>
-      rpy;  // [rad] of the tool in the frame, or the turn in its axes; none: as it is
-  std::optional<Vec3> via;  // [m] like `position`
-  double duration = 0.0;    // [s]; 0: by `speed`
-  double speed = 0.0;       // [m/s]
+  std::optional<Vec3> rpy;       // [rad] of the tool, or the turn of it; none: as it is
+  std::optional<Vec3> via;       // [m] like `position`
+  double duration = 0.0;         // [s]; 0: by `speed`
+  double speed = 0.0;            // [m/s]
 };
 inline constexpr std::string_view kToolFrameNames[] = {"robot", "platform", "inertial"};
+
+/// X_FL0 of a frame, the platform at X_IP.
+Transform baseIn(ToolOrder::Frame frame, const Transform& X_IP, const Transform& X_PL0);
 
 /// The goal of an order: the tool stands at X_L0T, and the robot's base at X_FL0 in the frame of
 /// the order.

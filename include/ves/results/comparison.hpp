@@ -4,6 +4,7 @@
 #pragma once
 
 #include <deque>
+#include <map>
 #include <optional>
 #include <vector>
 
@@ -75,6 +76,9 @@ class ReferenceMotions {
 /// and where the base's motion grows without bound.
 std::optional<Emulation> emulation(const Series& series, ReferenceMotions& references);
 std::optional<Emulation> emulation(const Series& series);
+
+/// Where the base would be, from home [m, rad], by the tick that it is for.
+std::map<std::int64_t, Vec6> basePoses(const Series& series, const Emulation& emulation);
 
 /// A mode of base and robot together, the robot's joints locked.
 struct CoupledMode {

@@ -14,6 +14,12 @@ inline constexpr int kMaxLinks = 24;   // [-] that move: the joints' own, and th
 
 enum class JointType { kRevolute, kPrismatic };
 
+/// Joint values in files and messages: [rad/deg] of one that turns, [1] of one that slides.
+inline double jointUnit(JointType type) { return type == JointType::kRevolute ? kDegree : 1.0; }
+inline const char* jointUnitName(JointType type) {
+  return type == JointType::kRevolute ? "deg" : "m";
+}
+
 /// Mass, centre and inertia of a rigid body B.
 struct RigidBody {
   double mass = 0.0;              // [kg]
@@ -22,6 +28,13 @@ struct RigidBody {
 
   bool operator==(const RigidBody&) const = default;
 };
+
+/// The symmetric matrix of {xx, yy, zz, xy, xz, yz}.
+inline Mat3 inertiaOf(const Vec6& i) {
+  Mat3 I;
+  I << i(0), i(3), i(4), i(3), i(1), i(5), i(4), i(5), i(2);
+  return I;
+}
 
 /// One body of both, expressed in A; B's frame is posed in A.
 RigidBody combine(const RigidBody& a_A, const Transform& X_AB, const RigidBody& b_B) noexcept;

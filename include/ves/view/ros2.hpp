@@ -16,10 +16,4 @@ namespace ves {
 /// more for them. Throws InputError when the file cannot be written.
 void writeMcap(const Series& series, const std::string& log, const std::string& file);
 
-/// A ros2msg definition of an .lcm struct, its comments behind the fields.
-std::string ros2Definition(const std::string& lcm);
-
-/// The bytes of an LCM message as CDR; empty when they are not of that definition.
-std::string cdrOf(const std::string& lcm, const std::vector<std::uint8_t>& message);
-
 }  // namespace ves

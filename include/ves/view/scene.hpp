@@ -5,7 +5,6 @@
 #pragma once
 
 #include <functional>
-#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -45,9 +44,6 @@ class Scene {
   std::vector<Scalar> scalars_;
   nlohmann::ordered_json description_;
 };
-
-/// Where the base in free space would be, from home, by tick; empty without an emulation.
-std::map<std::int64_t, Vec6> basePoses(const Series& series);
 
 /// A recorded run for a page: its scene, and pictures at most `rate` [1/s] times a second.
 nlohmann::ordered_json recording(const Series& series, double rate);
