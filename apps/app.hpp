@@ -136,6 +136,9 @@ inline void printWords(const CLI::App& cli) {
     for (const std::string& name : option->get_lnames()) fmt::print("--{} ", name);
 }
 
+/// Environment: the token of a socket that `ves view` inherits. Arguments are for all to see.
+inline constexpr const char* kViewToken = "VES_VIEW_TOKEN";
+
 /// This very program, to start its other processes.
 inline std::filesystem::path ownProgram() {
   return std::filesystem::read_symlink("/proc/self/exe");

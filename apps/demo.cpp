@@ -16,6 +16,7 @@ int demoCommand(int argc, char** argv) {
   options.addOut(cli);
   options.addBus(cli);
   options.addQuiet(cli);
+  options.addView(cli);
   return run(cli, argc, argv, [&] { return runExperiment(options); });
 }
 

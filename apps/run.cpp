@@ -18,6 +18,7 @@ int runCommand(int argc, char** argv) {
   options.addOut(cli);
   cli.add_flag("--two-processes", options.two_processes, "in lockstep too, over the bus");
   options.addQuiet(cli);
+  options.addView(cli);
   cli.add_flag("!--no-plots", options.plots, "leave the plots out");
   return run(cli, argc, argv, [&] { return runExperiment(options); });
 }

@@ -10,6 +10,8 @@
 #include "app.hpp"
 #include "ves/realtime/realtime.hpp"
 #include "ves/results/results.hpp"
+#include "ves/run/process.hpp"
+#include "ves/view/web_server.hpp"
 
 namespace ves::app {
 
@@ -19,9 +21,13 @@ struct RunnerOptions : Options {
   std::string out;
   bool two_processes = false;
   bool plots = true;
+  bool view = false;
 
   void addOut(CLI::App& cli) {
     cli.add_option("--out", out, "folder for the results; a new one in ves-runs by default");
+  }
+  void addView(CLI::App& cli) {
+    cli.add_flag("--view", view, "show it in a browser meanwhile; prints the address");
   }
   void addQuiet(CLI::App& cli) {
     cli.add_flag("--quiet", quiet, "no progress and no table; warnings and errors only");
@@ -70,7 +76,24 @@ inline int statusOf(const RunResult& result) {
   return result.good() ? kDone : kTripped;
 }
 
+/// `ves view` on a socket of this network, for a bus that may be in another.
+inline std::unique_ptr<Process> startView(const Listener& listener, const std::string& url) {
+  setenv(kViewToken, listener.token.c_str(), 1);
+  fcntl(listener.descriptor, F_SETFD, 0);
+  auto view = std::make_unique<Process>(
+      ownProgram(), std::vector<std::string>{"view", "--url", url, "--listener",
+                                             std::to_string(listener.descriptor)});
+  unsetenv(kViewToken);
+  close(listener.descriptor);
+  fmt::print("watch it at {}\n", listener.url());
+  std::fflush(stdout);
+  return view;
+}
+
 inline int runExperiment(RunnerOptions& options) {
+  const bool one_process = options.process.lockstep && !options.two_processes;
+  if (options.view && one_process)
+    throw InputError("--view: a run in lockstep is over too soon; want ves view LOG afterwards");
   Experiment experiment = options.load();
   printWarnings(experiment, options.verbose);
   requireStability(experiment);
@@ -79,7 +102,8 @@ inline int runExperiment(RunnerOptions& options) {
 
   Progress progress(experiment);
   RunResult result;
-  if (options.process.lockstep && !options.two_processes) {
+  std::unique_ptr<Process> view;
+  if (one_process) {
     LogWriter writer(launch.process.log);
     result = runLockstep(experiment, &writer, [&](const TickState& state) {
       double x[6];
@@ -88,7 +112,10 @@ inline int runExperiment(RunnerOptions& options) {
       return stop_requested ? Order{Request::kStop, {}, {}} : Order();
     });
   } else {
+    std::optional<Listener> listener;
+    if (options.view) listener = listenOn("127.0.0.1", {});
     prepareBus(options, true);
+    if (listener) view = startView(*listener, options.process.url);
     launch.process.start = true;
     result = runProcesses(
         experiment, launch,

@@ -1,46 +1,112 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// ves view: a recorded run to look at, as one file for a browser.
+// ves view: a run in a browser, as it happens or from its log; or a log as one file.
 #include <fstream>
 
 #include "app.hpp"
 #include "commands.hpp"
 #include "ves/results/series.hpp"
+#include "ves/view/live_run.hpp"
 #include "ves/view/page.hpp"
 #include "ves/view/scene.hpp"
 
 namespace ves::app {
+namespace {
+
+struct ViewOptions {
+  std::vector<std::string> logs;
+  std::string html;
+  std::optional<double> rate;
+  std::string url = kDefaultUrl, address = "127.0.0.1";
+  std::optional<int> port;
+  int listener = -1;
+};
+
+std::string recordedPage(const ViewOptions& options, double rate) {
+  std::vector<nlohmann::ordered_json> recordings;
+  for (const std::string& log : options.logs) {
+    const Series series = readSeries(log);
+    printDamage(series.damage);
+    recordings.push_back(recording(series, rate));
+  }
+  return page(recordings);
+}
+
+int writePage(const ViewOptions& options) {
+  constexpr double kSeen = 60.0;  // [1/s]
+  const std::string text = recordedPage(options, options.rate.value_or(kSeen));
+  std::ofstream out(options.html, std::ios::binary);
+  out << text;
+  out.close();
+  if (!out) throw InputError(fmt::format("--html {}: {}", options.html, std::strerror(errno)));
+  fmt::print("{} ({:.1f} MB): open it in a browser\n", options.html,
+             static_cast<double>(text.size()) * 1e-6);
+  return kDone;
+}
+
+int servePage(const ViewOptions& options) {
+  constexpr double kEveryTick = 1000.0;  // [1/s]
+  catchSignals();
+  const bool inherited = options.listener >= 0;
+  const char* token = std::getenv(kViewToken);
+  const Listener listener = inherited ? inheritedListener(options.listener, token ? token : "")
+                                      : listenOn(options.address, options.port);
+  std::optional<LiveRun> live;
+  if (options.logs.empty()) live.emplace(options.url);
+  WebServer server(listener,
+                   live ? livePage() : recordedPage(options, options.rate.value_or(kEveryTick)),
+                   live ? &*live : nullptr);
+  if (!inherited) {
+    fmt::print("{}\n", listener.url());
+    if (listener.address.rfind("127.", 0) != 0)
+      fmt::print(
+          stderr,
+          "warning: open to every machine that reaches {}:{}, not encrypted: whoever has this "
+          "address sees the run{}\n",
+          listener.address, listener.port, live ? " and can ask it to stop" : "");
+    fmt::print(stderr, "open this address in a browser; Ctrl-C ends\n");
+    std::fflush(stdout);
+  }
+  if (live) server.watch(live->descriptor(), [] {});
+  while (!stop_requested) {
+    server.serve(50);
+    if (live && live->listen()) server.show();
+  }
+  const WebRefusals& refused = server.refusals();
+  if (refused.total() > 0)
+    fmt::print(
+        stderr,
+        "ves view: not let in: {} without the token, {} from elsewhere, {} malformed, {} too "
+        "many\n",
+        refused.token, refused.origin, refused.malformed, refused.full);
+  return kDone;
+}
+
+}  // namespace
 
 int viewCommand(int argc, char** argv) {
   CLI::App cli(
-      "A recorded run in three dimensions: platform, legs, robot, force, and where the base in "
-      "free "
-      "space would be; as one file that a browser opens from disk. A second log is laid over it.",
+      "The run on the bus, or a recorded one, in a browser: platform, legs, robot, force, flexible "
+      "arm, and where the base in free space would be. A second log is laid over the first.",
       "ves view");
-  std::vector<std::string> logs;
-  std::string html;
-  double rate = 60.0;
-  cli.add_option("log", logs, "LCM event logs of one run, or two")->required()->expected(1, 2);
-  cli.add_option("--html", html, "file to write; view.html beside the log by default");
-  cli.add_option("--rate", rate, "[1/s] pictures")->check(inRange(0.1, 1000.0));
+  ViewOptions options;
+  cli.add_option("log", options.logs, "LCM event logs of one run, or two; none: the run on the bus")
+      ->expected(0, 2);
+  auto* html = cli.add_option("--html", options.html,
+                              "write one file that a browser opens from disk, and serve nothing");
+  cli.add_option("--rate", options.rate,
+                 "[1/s] pictures of a log; 60 in a file, every tick in a browser")
+      ->check(inRange(0.1, 1000.0));
+  cli.add_option("--url", options.url, "LCM bus")->capture_default_str();
+  cli.add_option("--port", options.port, "8780 by default, or a free one where that is taken")
+      ->check(CLI::Range(0, 65535));
+  cli.add_option("--bind", options.address, "address of this machine that browsers connect to")
+      ->capture_default_str();
+  cli.add_option("--listener", options.listener)->group("");  // for ves run --view
   return run(cli, argc, argv, [&] {
-    std::vector<nlohmann::ordered_json> recordings;
-    for (const std::string& log : logs) {
-      const Series series = readSeries(log);
-      printDamage(series.damage);
-      recordings.push_back(recording(series, rate));
-    }
-    const std::string text = page(recordings);
-    const std::filesystem::path file =
-        html.empty() ? std::filesystem::path(logs.front()).parent_path() / "view.html"
-                     : std::filesystem::path(html);
-    std::ofstream out(file, std::ios::binary);
-    out << text;
-    out.close();
-    if (!out) throw InputError(fmt::format("--html {}: {}", file.string(), std::strerror(errno)));
-    fmt::print("{} ({:.1f} MB): open it in a browser\n", file.string(),
-               static_cast<double>(text.size()) * 1e-6);
-    return kDone;
+    if (html->count() == 0) return servePage(options);
+    if (options.logs.empty()) throw InputError("--html: want a log");
+    return writePage(options);
   });
 }
 

@@ -31,10 +31,10 @@ class ClosedLoop : public testing::Test {
   static Experiment experiment(const std::string& name, const std::vector<std::string>& set = {}) {
     return test::experiment(name, set);
   }
-  Series run(const Experiment& e) {
+  Series run(const Experiment& e, const Watch& watch = nullptr) {
     {
       LogWriter writer(log_.string());
-      result_ = runLockstep(e, &writer, nullptr);
+      result_ = runLockstep(e, &writer, watch);
     }
     return readSeries(log_.string());
   }
@@ -250,6 +250,10 @@ TEST_F(ClosedLoop, AProgramThatEndsEarlySaysWhy) {
   EXPECT_EQ(said.rfind("the calibration was refused: fz would have a bias of ", 0), 0u) << said;
   const Series series = run(experiment("puma_on_table_4_1", {"program=[{move: {}}]"}));
   EXPECT_FALSE(summarise(series, result_).contains("ended_early"));
+  const Series stopped = run(experiment("puma_on_table_4_1"), [](const TickState& state) {
+    return state.tick == 400 ? Order{Request::kStop, {}, {}} : Order();
+  });
+  EXPECT_EQ(summarise(stopped, result_)["ended_early"], "a stop was requested at 4.01 s");
 }
 
 TEST_F(ClosedLoop, TheToolIsWhereThePlatformCarriesIt) {

@@ -7,6 +7,7 @@
 
 #include "support/refusal.hpp"
 #include "ves/config/document.hpp"
+#include "ves/run/announcer.hpp"
 #include "ves/transport/bus.hpp"
 #include "ves/transport/channels.hpp"
 #include "ves/transport/fields.hpp"
@@ -210,6 +211,42 @@ TEST_F(PrivateBus, ControllerKeepsTheNewestSampleOfTheNewestPlant) {
   settle(machine, controller, [&] { return link.rejected() == 4; });
   EXPECT_EQ(link.sample().sequence, 0);
   EXPECT_TRUE(link.takeConflict());
+}
+
+TEST_F(PrivateBus, WhoComesLateHearsTheConfiguration) {
+  Bus late(kDefaultUrl);
+  std::int64_t heard = 0, sequence = -1;
+  late.subscribe(channel::kExperiment,
+                 [&](const std::string&, const void* data, std::uint32_t size) {
+                   const auto m = decode<experiment_t>(data, size);
+                   ASSERT_TRUE(m);
+                   EXPECT_EQ(m->resolved, "name: x");
+                   EXPECT_GT(m->header.sequence, sequence);
+                   sequence = m->header.sequence;
+                   ++heard;
+                 });
+  experiment_t experiment;
+  experiment.header = header({7, 8}, 0, 0);
+  experiment.schema = kSchema;
+  experiment.resolved = "name: x";
+  Announcer announcer(kDefaultUrl, experiment);
+  while (heard < 3 && late.wait(5000)) {
+  }
+  EXPECT_EQ(heard, 3);
+  announcer.tell(Phase::kRunning);  // one may be under way
+  while (late.wait(1500)) {
+  }
+  EXPECT_LE(heard, 4);
+  const std::int64_t before = heard;
+  for (int i = 0; i < 100; ++i) {
+    query_t query;
+    query.header = header({1, 1}, i, 0);
+    late.publish(channel::kQuery, query);
+  }
+  while (late.wait(1500)) {
+  }
+  EXPECT_GT(heard, before);
+  EXPECT_LE(heard, before + 2);  // however often it is asked
 }
 
 TEST_F(PrivateBus, OneControllerHasTheLegs) {

@@ -177,7 +177,9 @@ Base readBase(Section s) {
     const int dofs = out.arm->frame.dofs();
     if (dofs == 0) section.fail("chain", "has nothing that can move");
     try {
-      out.modes = tipModes(*out.arm, arm.damping_ratio, readKeep(s, dofs));
+      ArmModes modes = armModes(*out.arm, arm.damping_ratio, readKeep(s, dofs));
+      out.modes = std::move(modes.tip);
+      out.shape = std::move(modes.shape);
     } catch (const std::domain_error&) {
       section.fail("chain",
                    "a part that can move has no mass; want mass in every beam, or inertia "

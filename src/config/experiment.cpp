@@ -102,7 +102,9 @@ Experiment build(const Value& document) {
   c.servo.jitter = c.compensation.jitter;
   if (root.has("servo")) c.servo = withRecord(c.servo, readServo(root.section("servo")));
   c.safety = readSafety(root.section("safety"), sensor.model.volts_per_count);
-  c.admittance = readBase(root.section("base")).modes;
+  const Base base = readBase(root.section("base"));
+  c.admittance = base.modes;
+  out.arm = base.shape;
 
   c.payload.X_PS = sensor.X_PS;
   c.payload.top_plate_S = sensor.top_plate_S;

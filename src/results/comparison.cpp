@@ -80,36 +80,44 @@ std::optional<Emulation> emulation(const Series& series) {
   return emulation(series, references);
 }
 
-std::optional<Emulation> emulation(const Series& series, ReferenceMotions& references) {
+std::optional<Vec6> BaseMotion::at(std::int64_t tick) const {
+  if (tick < 0 || tick >= std::ssize(base.x)) return {};
+  return base.x[static_cast<std::size_t>(tick)] + rest;
+}
+
+std::optional<BaseMotion> baseMotion(const Experiment& e, const Vec6& start,
+                                     ReferenceMotions& references) {
   constexpr Eigen::Index kMostModes = 12;
-  const Experiment& e = series.experiment;
   if (!wantsAdmittance(e.controller.program) ||
       e.controller.admittance.stiffness.size() > kMostModes)
     return {};
-  Emulation out;
-  out.platform = actual(series);
-  if (out.platform.x.size() < 2) return {};
   std::int64_t duration = 0;
   const Interaction interaction = interactionOf(e, duration);
-  const Vec6 start = commanded(series).x.front();
   const Eigen::VectorXd eta = leastSquares(interaction.base.Phi, start);
-  out.rest = start - interaction.base.Phi * eta;
-  for (Vec6& x : out.platform.x) x -= out.rest;
   const std::optional<Motion>& base =
       references.of(interaction, e.controller.period, duration, eta);
   if (!base) return {};
-  out.base = *base;
+  return BaseMotion{*base, start - interaction.base.Phi * eta};
+}
+
+std::optional<Emulation> emulation(const Series& series, ReferenceMotions& references) {
+  Emulation out;
+  out.platform = actual(series);
+  if (out.platform.x.size() < 2) return {};
+  const auto base = baseMotion(series.experiment, commanded(series).x.front(), references);
+  if (!base) return {};
+  static_cast<BaseMotion&>(out) = *base;
+  for (Vec6& x : out.platform.x) x -= out.rest;
   return out;
 }
 
-std::map<std::int64_t, Vec6> basePoses(const Series& series, const Emulation& emulation) {
+std::map<std::int64_t, Vec6> basePoses(const Series& series, const BaseMotion& motion) {
   std::map<std::int64_t, Vec6> out;
   std::optional<std::int64_t> first;
   eachTick(series, [&](const Row& row, double) {
     const std::int64_t tick = row.state.header.sequence;
     if (!first) first = tick;
-    const auto k = static_cast<std::size_t>(tick - *first);  // late ticks are missing
-    if (k < emulation.base.x.size()) out[tick] = emulation.base.x[k] + emulation.rest;
+    if (const auto x = motion.at(tick - *first)) out[tick] = *x;  // late ticks are missing
   });
   return out;
 }

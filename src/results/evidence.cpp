@@ -127,6 +127,11 @@ std::string stirred(const state_t& s, const Experiment& experiment) {
 }
 
 std::string whyEarly(const Series& series) {
+  const auto stop = std::find_if(series.rows.begin(), series.rows.end(), [](const Row& row) {
+    return row.state.request == static_cast<int>(Request::kStop) &&
+           row.state.phase == static_cast<int>(Phase::kReturning);
+  });
+  if (stop != series.rows.end()) return fmt::format("a stop was requested at {:.2f} s", stop->t);
   const auto first = std::find_if(series.rows.begin(), series.rows.end(),
                                   [](const Row& row) { return row.state.aborted != 0; });
   if (first == series.rows.end()) return {};

@@ -23,11 +23,16 @@ std::optional<Row> RowMaker::add(const LogEvent& event, const std::string& log) 
     add(event.require<truth_t>(log));
   } else if (event.channel == channel::kSample) {
     add(event.require<sample_t>(log));
-  } else if (event.channel == channel::kTiming && row_) {
-    row_->timing = event.require<timing_t>(log);
-    row_->has_timing = true;
+  } else if (event.channel == channel::kTiming) {
+    add(event.require<timing_t>(log));
   }
   return {};
+}
+
+void RowMaker::add(const timing_t& timing) {
+  if (!row_) return;
+  row_->timing = timing;
+  row_->has_timing = true;
 }
 
 std::optional<Row> RowMaker::add(const state_t& state) {

@@ -3,6 +3,7 @@
 
 #include "ves/realtime/latency.hpp"
 #include "ves/realtime/realtime.hpp"
+#include "ves/run/announcer.hpp"
 #include "ves/run/flight_record.hpp"
 #include "ves/run/robot_orders.hpp"
 #include "ves/run/run.hpp"
@@ -56,13 +57,14 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
                     log->write(from, data, size, link.sampleTime());
                   });
   }
-  bus.publish(channel::kExperiment, describe(experiment, self, monotonicNow()));
+  Announcer announcer(options.url, describe(experiment, self, 0));
 
   TickInput in;
   if (options.start) in.order.request = Request::kStart;
   const std::int64_t start = monotonicNow();
 
   const auto finish = [&](const TickState& state) {
+    announcer.tell(state.phase);
     in.order = watch(state);
     if (in.order.request == Request::kNone) in.order = link.takeOrder();
     in.conflicting_node = link.takeConflict();

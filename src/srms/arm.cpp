@@ -16,6 +16,7 @@ struct Builder {
   BeamModel frame;
   Transform X_AB;  // the axes that the next part is given in
   BeamModel::Point at = BeamModel::ground(Vec3::Zero());
+  std::vector<BeamModel::Point> ends = {at};
 
   void operator()(const ArmJoint& joint) {
     const Vec3 axis_A = X_AB.R * joint.axis;
@@ -32,6 +33,7 @@ struct Builder {
       const BeamModel::Point next = frame.node(X_AB.p);
       frame.beam(at, next, section);
       at = next;
+      ends.push_back(at);
     }
   }
   void operator()(const ArmHousing& housing) { frame.lump(at, rotated(X_AB.R, housing.body)); }
@@ -44,7 +46,7 @@ ArmModel assemble(const ArmDescription& arm) {
   for (const ArmPart& part : arm.chain) std::visit(build, part);
   const Transform X_AP{build.X_AB.R * arm.R_TP, build.X_AB.p};
   build.frame.lump(build.at, rotated(X_AP.R, arm.payload_P));
-  return {build.frame, build.at, X_AP};
+  return {build.frame, build.at, X_AP, build.ends};
 }
 
 Eigen::MatrixXd tipDisplacement(const ArmModel& arm) {
@@ -66,18 +68,26 @@ Vec6 masslessFrequencies(const ArmModel& arm, const RigidBody& payload_P) {
          (2.0 * M_PI);
 }
 
-ModalModel tipModes(const ArmModel& arm, double damping_ratio, int keep) {
-  const Eigenmodes modes = eigenmodes(arm.frame.M(), arm.frame.K());
+ArmModes armModes(const ArmModel& arm, double damping_ratio, int keep) {
+  Eigenmodes modes = eigenmodes(arm.frame.M(), arm.frame.K());
   const Eigen::Index k =
       keep ? std::min<Eigen::Index>(keep, modes.stiffness.size()) : modes.stiffness.size();
-  ModalModel out;
-  out.Phi = tipDisplacement(arm) * modes.shapes.leftCols(k);
-  out.stiffness = modes.stiffness.head(k);
-  out.damping = (2.0 * damping_ratio * out.stiffness.cwiseSqrt()).asDiagonal();
-  for (auto shape : out.Phi.colwise()) {  // a mode has no sign of its own: largest entry positive
+  ArmModes out;
+  out.tip.Phi = tipDisplacement(arm) * modes.shapes.leftCols(k);
+  out.tip.stiffness = modes.stiffness.head(k);
+  out.tip.damping = (2.0 * damping_ratio * out.tip.stiffness.cwiseSqrt()).asDiagonal();
+  for (Eigen::Index i = 0; i < k; ++i) {  // a mode has no sign of its own: largest entry positive
     Eigen::Index largest = 0;
-    shape.cwiseAbs().maxCoeff(&largest);
-    if (shape(largest) < 0.0) shape = -shape;
+    out.tip.Phi.col(i).cwiseAbs().maxCoeff(&largest);
+    if (out.tip.Phi(largest, i) >= 0.0) continue;
+    out.tip.Phi.col(i) *= -1.0;
+    modes.shapes.col(i) *= -1.0;
+  }
+  const Transform X_PA = inverse(arm.X_AP);
+  for (const BeamModel::Point& end : arm.ends) {
+    out.shape.points.push_back(X_PA * end.p);
+    out.shape.displacements.push_back(X_PA.R * arm.frame.displacement(end).topRows<3>() *
+                                      modes.shapes.leftCols(k));
   }
   return out;
 }

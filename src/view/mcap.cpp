@@ -21,7 +21,7 @@ constexpr int kLevel = 3;                // [-] of zstd
 enum Opcode : std::uint8_t {
   kHeader = 1,
   kFooter,
-  kSchema,
+  kSchemaRecord,
   kChannel,
   kMessage,
   kChunkRecord,
@@ -101,8 +101,9 @@ std::uint16_t McapWriter::addChannel(const std::string& topic, const std::string
   const auto [at, fresh] =
       schema_ids_.emplace(schema, static_cast<std::uint16_t>(schema_ids_.size() + 1));
   if (fresh) {
-    schemas_.push_back(record(
-        kSchema, Fields().number(at->second).text(schema).text(schema_encoding).text(schema_text)));
+    schemas_.push_back(
+        record(kSchemaRecord,
+               Fields().number(at->second).text(schema).text(schema_encoding).text(schema_text)));
     chunk_ += schemas_.back();
   }
   const auto id = static_cast<std::uint16_t>(channels_.size());
@@ -211,7 +212,7 @@ void McapWriter::finish() {
     for (const std::string& one : records) all += one;
     if (!records.empty()) groups.push_back({opcode, start, summary + all.size() - start});
   };
-  group(kSchema, schemas_);
+  group(kSchemaRecord, schemas_);
   std::vector<std::string> records;
   for (const Channel& channel : channels_) records.push_back(channel.record);
   group(kChannel, records);

@@ -33,6 +33,16 @@ std::string script(std::string text) {
   return "<script>\n" + text + "\n</script>\n";
 }
 
+std::string pageOf(const std::string& title, const std::string& recordings) {
+  return "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+         "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>" +
+         title + "</title>\n<style>\n" + library("dygraphs/dygraph.min.css") + kPageStyle +
+         "</style>\n</head>\n" + kPageBody + script(library("three/three.min.js")) +
+         script(library("three/examples/js/controls/OrbitControls.js")) +
+         script(library("dygraphs/dygraph.min.js")) +
+         script("window.VES_RECORDINGS = " + recordings + ";") + script(kPageScript) + "</html>\n";
+}
+
 }  // namespace
 
 std::string base64(const std::vector<float>& numbers) {
@@ -52,16 +62,10 @@ std::string base64(const std::vector<float>& numbers) {
 }
 
 std::string page(const std::vector<nlohmann::ordered_json>& recordings) {
-  const std::string title =
-      recordings.empty() ? "VES" : recordings.front()["scene"]["name"].get<std::string>();
   const nlohmann::ordered_json all = recordings;
-  return "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
-         "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>" +
-         title + "</title>\n<style>\n" + library("dygraphs/dygraph.min.css") + kPageStyle +
-         "</style>\n</head>\n" + kPageBody + script(library("three/three.min.js")) +
-         script(library("three/examples/js/controls/OrbitControls.js")) +
-         script(library("dygraphs/dygraph.min.js")) +
-         script("window.VES_RECORDINGS = " + all.dump() + ";") + script(kPageScript) + "</html>\n";
+  return pageOf(recordings.front()["scene"]["name"].get<std::string>(), all.dump());
 }
+
+std::string livePage() { return pageOf("VES", "[]"); }
 
 }  // namespace ves

@@ -2,25 +2,38 @@
 'use strict';
 // The page places objects where the pictures say; all geometry comes from the program.
 (function () {
+  const KEPT = 60;          // [s] of a live run
+  const REDRAWN = 250;      // [ms] between a live run's charts
+  const ARM_RADIUS = 0.12;  // [m]
+  const UP = new THREE.Vector3(0, 1, 0);  // of three.js's cylinders
   const COLOURS = ['#0067a8', '#c14e00', '#00805e'];
   const NUMBERS = 7;  // of a frame: position, quaternion
 
+  /** Pictures of one run, in the order of time. */
   class Recording {
-    constructor(data) {
-      this.scene = data.scene;
-      this.width = data.width;
+    constructor(scene, width, pictures) {
+      this.scene = scene;
+      this.width = width;
+      this.pictures = pictures;
+      this.frameAt = new Map(scene.frames.map((f, k) => [f.name, NUMBERS * k]));
+      this.armAt = NUMBERS * scene.frames.length;
+      this.scalarAt = new Map(scene.scalars.map((name, k) => [name, this.armAt + 3 * scene.arm.length + k]));
+    }
+    static of(data) {
       const bytes = Uint8Array.from(atob(data.pictures), c => c.charCodeAt(0));
-      this.numbers = new Float32Array(bytes.buffer);
-      this.count = this.numbers.length / this.width;
-      this.scalarsAt = NUMBERS * this.scene.frames.length;
+      const numbers = new Float32Array(bytes.buffer), pictures = [];
+      for (let i = 0; i < numbers.length; i += data.width) pictures.push(numbers.subarray(i, i + data.width));
+      return new Recording(data.scene, data.width, pictures);
     }
+    get count() { return this.pictures.length; }
     frame(i, name) {
-      const k = this.scene.frames.findIndex(f => f.name === name);
-      return this.numbers.subarray(i * this.width + NUMBERS * k, i * this.width + NUMBERS * (k + 1));
+      const k = this.frameAt.get(name);
+      return this.pictures[i].subarray(k, k + NUMBERS);
     }
-    scalar(i, name) {
-      return this.numbers[i * this.width + this.scalarsAt + this.scene.scalars.indexOf(name)];
-    }
+    /** By which point k of the arm is bent. */
+    bent(i, k) { return this.pictures[i].subarray(this.armAt + 3 * k, this.armAt + 3 * k + 3); }
+    knows(name) { return this.scalarAt.has(name); }
+    scalar(i, name) { return this.pictures[i][this.scalarAt.get(name)]; }
     time(i) { return this.scalar(i, 't_s'); }
     /** The last picture not after t [s]. */
     at(t) {
@@ -37,9 +50,10 @@
   class Bodies {
     constructor(recording, world, look) {
       this.recording = recording;
+      this.world = world;
       this.frames = {'': world};
       this.legs = [];
-      this.ghosts = [];
+      this.shapes = [];  // that stand still
       for (const f of recording.scene.frames) {
         this.frames[f.name] = new THREE.Group();
         this.frames[f.parent].add(this.frames[f.name]);
@@ -56,14 +70,28 @@
       for (const shape of recording.scene.shapes) {
         const mesh = body(shape, look);
         this.frames[shape.frame].add(mesh);
+        if (shape.frame === '') this.shapes.push(mesh);
         if ('leg' in shape) this.legs.push([shape.leg, mesh]);
         const twin = twinOf(shape.frame);
         if (twin) twin.add(body(shape, {colour: 0x7a5cc0, opacity: 0.22}));
       }
       this.force = new THREE.ArrowHelper(new THREE.Vector3(0, 0, 1), new THREE.Vector3(), 0.1, 0xc1121f, 0.08, 0.05);
       world.add(this.force);
+      this.arm = recording.scene.arm.slice(1).map(() => {
+        const mesh = new THREE.Mesh(new THREE.CylinderBufferGeometry(ARM_RADIUS, ARM_RADIUS, 1, 16),
+          new THREE.MeshStandardMaterial({color: look.colour || 0xb9b2a0, roughness: 0.7, transparent: look.opacity < 1, opacity: look.opacity || 1}));
+        world.add(mesh);
+        return mesh;
+      });
     }
-    place(i, ghost, newtonsPerMetre) {
+    remove() {
+      for (const f of this.recording.scene.frames) if (f.parent === '') this.world.remove(this.frames[f.name]);
+      for (const shape of this.shapes) this.world.remove(shape);
+      for (const mesh of this.arm) this.world.remove(mesh);
+      this.world.remove(this.force);
+    }
+    /** `show`: ghost, newtonsPerMetre, bending. */
+    place(i, show) {
       const r = this.recording;
       const put = (object, name) => {
         const p = r.frame(i, name);
@@ -75,19 +103,29 @@
       };
       for (const f of r.scene.frames) put(this.frames[f.name], f.name);
       for (const [name, twin] of this.twins) put(twin, name);
-      this.frames.base.visible = this.frames.base.visible && ghost;
+      this.frames.base.visible = this.frames.base.visible && show.ghost;
       for (const [leg, mesh] of this.legs) {
         const margin = Math.max(0, Math.min(1, r.scalar(i, `leg${leg + 1}_margin`)));
         mesh.material.color.setHSL(0.33 * Math.min(1, margin * 2), margin < 0.5 ? 0.6 : 0.12, 0.5);
       }
       const f = new THREE.Vector3(r.scalar(i, 'fx_dynamic'), r.scalar(i, 'fy_dynamic'), r.scalar(i, 'fz_dynamic'));
-      const length = f.length() / newtonsPerMetre;
+      const length = f.length() / show.newtonsPerMetre;
       this.force.visible = length > 0.02 && isFinite(length);
       if (this.force.visible) {
         this.force.position.copy(this.frames.platform.position);
         this.force.setDirection(f.normalize());
         this.force.setLength(Math.min(length, 3), 0.08, 0.05);
       }
+      const points = r.scene.arm.map((p, k) =>
+        new THREE.Vector3(...p).addScaledVector(new THREE.Vector3(...r.bent(i, k)), show.bending));
+      this.arm.forEach((mesh, k) => {
+        const way = points[k + 1].clone().sub(points[k]), length = way.length();
+        mesh.visible = length > 1e-6;
+        if (!mesh.visible) return;
+        mesh.position.copy(points[k]).addScaledVector(way, 0.5);
+        mesh.quaternion.setFromUnitVectors(UP, way.normalize());
+        mesh.scale.set(1, length, 1);
+      });
     }
   }
 
@@ -96,7 +134,6 @@
       color: look.colour || {plate: 0x6b7885, cylinder: 0x8d99a6, capsule: 0xe0903a, axes: 0x333333}[shape.kind],
       transparent: look.opacity < 1, opacity: look.opacity || 1, roughness: 0.6, metalness: 0.1,
       depthWrite: !(look.opacity < 1)});
-    const up = new THREE.Vector3(0, 1, 0);  // of three.js's cylinders
     const group = new THREE.Group();
     const add = (geometry, place) => {
       const mesh = new THREE.Mesh(geometry, material);
@@ -118,7 +155,7 @@
       const way = b.clone().sub(a);
       add(new THREE.CylinderBufferGeometry(shape.radius, shape.radius, way.length(), 20), mesh => {
         mesh.position.copy(a).addScaledVector(way, 0.5);
-        mesh.quaternion.setFromUnitVectors(up, way.clone().normalize());
+        mesh.quaternion.setFromUnitVectors(UP, way.clone().normalize());
       });
       for (const end of [a, b])
         add(new THREE.SphereBufferGeometry(shape.radius * 1.15, 18, 14), mesh => mesh.position.copy(end));
@@ -130,8 +167,7 @@
   }
 
   const element = id => document.getElementById(id);
-  const recordings = window.VES_RECORDINGS.map(data => new Recording(data));
-  const first = recordings[0];
+  let first = null, bodies = [], live = null;
 
   // The scene, z up.
   THREE.Object3D.DefaultUp.set(0, 0, 1);
@@ -146,16 +182,20 @@
   const grid = new THREE.GridHelper(6, 24);
   grid.rotation.x = Math.PI / 2;
   world.add(grid);
-  const bodies = recordings.map((r, k) => new Bodies(r, world, k ? {colour: 0x3a7ca5, opacity: 0.4} : {}));
-  const reach = Math.min(first.scene.reach, 3), middle = 0.8 * first.scene.home + 0.25 * reach;
   function look(view) {
-    const far = 2.6 + first.scene.home + 0.7 * reach;
-    const from = {iso: [0.62, -0.95, 0.5], front: [0, -1.15, 0.02], side: [1.15, 0, 0.02], top: [0, -0.001, 1.2]}[view];
-    camera.position.set(far * from[0], far * from[1], middle + far * from[2]);
-    controls.target.set(0, 0, middle);
+    const reach = Math.min(first.scene.reach, 3), target = new THREE.Vector3(0, 0, 0.8 * first.scene.home + 0.25 * reach);
+    let far = 2.6 + first.scene.home + 0.7 * reach;
+    if (view === 'arm') {  // all of it
+      const box = new THREE.Box3().setFromPoints(first.scene.arm.map(p => new THREE.Vector3(...p)));
+      box.getCenter(target);
+      far = 1.3 * box.getSize(new THREE.Vector3()).length();
+    }
+    const from = {iso: [0.62, -0.95, 0.5], front: [0, -1.15, 0.02], side: [1.15, 0, 0.02], top: [0, -0.001, 1.2],
+                  arm: [0.62, -0.95, 0.5]}[view];
+    camera.position.set(target.x + far * from[0], target.y + far * from[1], target.z + far * from[2]);
+    controls.target.copy(target);
     controls.update();
   }
-  look('iso');
 
   // Charts: one column of time, one a curve.
   const SHOWN = [
@@ -164,61 +204,108 @@
     ['force, gravity taken out [N]', ['fx', 'fy', 'fz'].map(c => [`${c}_dynamic`, c, 1])],
     ['moment [N m]', ['mx', 'my', 'mz'].map(c => [`${c}_dynamic`, c, 1])],
     ['legs, commanded minus measured [mm]', [1, 2, 3, 4, 5, 6].map(i => [`leg${i}_error_m`, `leg ${i}`, 1e3])],
-    ['woke late [ms]', [['late_s', 'late', 1e3]]]];
-  const charts = [], cursors = [];
+    ['woke late [ms]', [['late_s', 'late', 1e3]]],
+    ['real-time factor', [['real_time_factor', 'factor', 1]]]];
+  let charts = [], marks = [];
   let shown = 0;
+  const nameOf = (list, i) => first.scene[list][Math.round(i)] || '';
   function mark() {
-    charts.forEach((chart, k) => { cursors[k].style.left = `${chart.toDomXCoord(first.time(shown))}px`; });
+    if (first.count) charts.forEach(c => { c.cursor.style.left = `${c.chart.toDomXCoord(first.time(shown))}px`; });
   }
-  for (const [title, solid, dashed] of SHOWN) {
-    const curves = solid.concat(dashed || []);
-    const rows = [];
-    let any = false;
-    for (let i = 0; i < first.count; ++i) {
-      const row = [first.time(i)];
-      for (const [name, , factor] of curves) {
-        const y = first.scalar(i, name) * factor;
-        any = any || !isNaN(y);
-        row.push(isNaN(y) ? null : y);
-      }
-      rows.push(row);
+  /** What begins at picture i, if anything does. */
+  function markOf(i) {
+    const what = k => `${first.scalar(k, 'phase')} ${first.scalar(k, 'segment')}`;
+    if (i > 0 && what(i) === what(i - 1)) return;
+    const kind = nameOf('kinds', first.scalar(i, 'kind')), phase = nameOf('phases', first.scalar(i, 'phase'));
+    marks.push({t: first.time(i), text: phase === 'running' ? kind : phase});
+  }
+  /** Lines where segments begin; their names in the first chart. */
+  function drawMarks(context, area, chart, named) {
+    context.save();
+    context.strokeStyle = '#88888888';
+    context.fillStyle = getComputedStyle(document.documentElement).getPropertyValue('--soft');
+    context.font = '10px system-ui, sans-serif';
+    let free = -Infinity;
+    for (const m of marks) {
+      const x = chart.toDomXCoord(m.t);
+      if (x < area.x || x > area.x + area.w) continue;
+      context.beginPath();
+      context.moveTo(x, area.y);
+      context.lineTo(x, area.y + area.h);
+      context.stroke();
+      if (!named || x < free) continue;
+      context.fillText(m.text, x + 3, area.y + area.h - 4);
+      free = x + 3 + context.measureText(m.text).width;
     }
-    if (!any) continue;
+    context.restore();
+  }
+  function chartOf(title, solid, dashed) {
+    const curves = solid.concat(dashed || []);
+    if (!curves.every(c => first.knows(c[0]))) return;
+    const row = i => [first.time(i)].concat(curves.map(([name, , factor]) => {
+      const y = first.scalar(i, name) * factor;
+      return isNaN(y) ? null : y;
+    }));
+    const rows = first.pictures.map((_, i) => row(i));
+    if (!live && rows.every(r => r.slice(1).every(y => y === null))) return;
     const place = document.createElement('div');
     place.className = 'chart';
     element('charts').appendChild(place);
-    const series = {};
+    const series = {}, named = charts.length === 0;
     (dashed || []).forEach(([, label]) => { series[label] = {strokePattern: [5, 4]}; });
-    charts.push(new Dygraph(place, rows, {
+    const chart = new Dygraph(place, rows.length ? rows : [[0].concat(curves.map(() => null))], {
       title, titleHeight: 16, labels: ['t'].concat(curves.map(c => c[1])), series, legend: 'always', labelsSeparateLines: false,
       legendFormatter: data => data.series.filter(s => !/commanded/.test(s.label)).map(s =>
         `<span style="color:${s.color}">${s.labelHTML}${data.x === undefined ? '' : ' ' + s.yHTML}</span>`).join('  ') + (dashed ? '  - - commanded' : ''),
       colors: curves.map((c, k) => COLOURS[k % 3]), strokeWidth: 1.4, axisLabelFontSize: 11, gridLineColor: '#88888844',
-      clickCallback: (event, t) => show(first.at(t)), drawCallback: (chart, initial) => { if (!initial) mark(); }}));
+      underlayCallback: (context, area, g) => drawMarks(context, area, g, named),
+      clickCallback: (event, t) => { play(false); show(first.at(t)); }, drawCallback: (c, initial) => { if (!initial) mark(); }});
     const cursor = document.createElement('div');
     cursor.className = 'cursor';
     place.appendChild(cursor);
-    cursors.push(cursor);
+    charts.push({chart, cursor, rows, row});
   }
 
-  const fit = () => charts.forEach(chart => chart.resize());
-  fit();
+  const fit = () => charts.forEach(c => c.chart.resize());
+
+  /** A page of these from here on; the first has the charts. */
+  function begin(recordings) {
+    bodies.forEach(b => b.remove());
+    charts.forEach(c => c.chart.destroy());
+    element('charts').textContent = '';
+    [charts, marks, shown, first] = [[], [], 0, recordings[0]];
+    bodies = recordings.map((r, k) => new Bodies(r, world, k ? {colour: 0x3a7ca5, opacity: 0.4} : {}));
+    first.pictures.forEach((_, i) => markOf(i));
+    for (const [title, solid, dashed] of SHOWN) chartOf(title, solid, dashed);
+    fit();
+    for (const place of document.querySelectorAll('.arm')) place.hidden = first.scene.arm.length < 2;
+    document.title = first.scene.name;
+    element('seek').max = Math.max(0, first.count - 1);
+    look('iso');
+    if (first.count) show(first.at(0));
+  }
 
   // One picture.
-  const nameOf = (list, i) => first.scene[list][Math.round(i)] || '';
   function show(i) {
+    if (!first || !first.count) return;
     shown = Math.max(0, Math.min(first.count - 1, i));
     const t = first.time(shown), newtonsPerMetre = 1000 / Math.pow(10, parseFloat(element('force').value));
-    bodies.forEach((b, k) => b.place(k ? b.recording.at(t) : shown, element('ghost').checked, newtonsPerMetre));
+    const bending = parseFloat(element('bending').value);
+    bodies.forEach((b, k) => b.place(k ? b.recording.at(t) : shown, {ghost: element('ghost').checked, newtonsPerMetre, bending}));
     const phase = nameOf('phases', first.scalar(shown, 'phase')), segment = first.scalar(shown, 'segment');
     const kind = nameOf('kinds', first.scalar(shown, 'kind')), cause = nameOf('checks', first.scalar(shown, 'cause'));
-    const words = element('words');
+    const asked = first.knows('stop_requested') ? first.scalar(shown, 'stop_requested') : 0;
+    const lines = [`${phase}${phase === 'running' && kind ? ': ' + kind : ''}${segment >= 0 && segment < first.scene.segments.length ? ` (${segment + 1} of ${first.scene.segments.length})` : ''}`];
+    if (cause) lines.push(`stopped by: ${cause}`);
+    if (asked) lines.push(asked < 2 ? 'stop requested' : 'stop requested from a browser, and taken');
+    lines.push(`force arrow: 1 m is ${Math.round(newtonsPerMetre)} N`);
+    if (first.scene.arm.length && bending > 1) lines.push(`arm's bending times ${bending}`);
+    if (live && live.closed) lines.push('no connection: the run or its viewer has ended');
+    const words = element('words'), head = document.createElement('b');
     words.textContent = '';
-    const head = document.createElement('b');
     head.textContent = first.scene.name;
-    words.append(head, `\n${phase}${kind ? ': ' + kind : ''}${segment >= 0 ? ` (${segment + 1} of ${first.scene.segments.length})` : ''}` +
-      (cause ? `\nstopped by: ${cause}` : '') + `\nforce arrow: 1 m is ${Math.round(newtonsPerMetre)} N`);
-    element('time').textContent = `${t.toFixed(2)} of ${first.time(first.count - 1).toFixed(2)} s`;
+    words.append(head, '\n' + lines.join('\n'));
+    element('time').textContent = live ? `${t.toFixed(2)} s` : `${t.toFixed(2)} of ${first.time(first.count - 1).toFixed(2)} s`;
     element('seek').value = shown;
     mark();
     dirty = true;
@@ -227,14 +314,16 @@
   // Time goes on.
   let playing = false, clock = 0, since = 0, dirty = true;
   function play(on) {
-    playing = on && first.count > 1;
-    if (playing && shown === first.count - 1) show(0);
-    clock = first.time(shown);
+    if (!first) return;
+    playing = on && (live !== null || first.count > 1);
+    if (playing && !live && shown === first.count - 1) show(0);
+    clock = first.count ? first.time(shown) : 0;
     since = performance.now();
-    element('play').textContent = playing ? 'pause' : 'play';
+    element('play').textContent = playing ? 'pause' : live ? 'live' : 'play';
   }
   function step(now) {
-    if (playing) {
+    if (live) live.draw(now);
+    else if (playing) {
       clock += (now - since) / 1000 * parseFloat(element('speed').value);
       since = now;
       const i = first.at(clock);
@@ -258,15 +347,15 @@
     requestAnimationFrame(step);
   }
   controls.addEventListener('change', () => { dirty = true; });
-  element('seek').max = first.count - 1;
   element('seek').addEventListener('input', () => { play(false); show(parseInt(element('seek').value, 10)); });
   element('play').addEventListener('click', () => play(!playing));
   element('back').addEventListener('click', () => { play(false); show(shown - 1); });
   element('forth').addEventListener('click', () => { play(false); show(shown + 1); });
   element('ghost').addEventListener('change', () => show(shown));
   element('force').addEventListener('input', () => show(shown));
+  element('bending').addEventListener('input', () => show(shown));
   for (const button of document.querySelectorAll('[data-view]'))
-    button.addEventListener('click', () => { look(button.dataset.view); dirty = true; });
+    button.addEventListener('click', () => { if (first) look(button.dataset.view); dirty = true; });
   const root = document.documentElement;
   root.dataset.theme = window.matchMedia && matchMedia('(prefers-color-scheme: dark)').matches ? 'dark' : 'light';
   element('theme').addEventListener('click', () => {
@@ -279,9 +368,70 @@
     if (event.key === 'ArrowRight') { play(false); show(shown + 1); }
   });
 
+  /** The run on the bus: the newest picture, and the last minute of what was drawn. */
+  class Live {
+    constructor() {
+      this.edition = 0;
+      this.redrawn = 0;
+      this.head = [0, 0, 0];  // of the last picture: its number, its time [ns], real-time factor
+      element('stop').hidden = false;
+      element('speed').hidden = true;
+      element('stop').addEventListener('click', () => this.send(`stop ${this.edition}`));
+      element('words').textContent = 'waiting for a run on the bus';
+      this.connect();
+    }
+    connect() {
+      this.socket = new WebSocket(`ws://${location.host}/${location.search}`, 'ves');
+      this.socket.binaryType = 'arraybuffer';
+      this.socket.onopen = () => { this.closed = false; };
+      this.socket.onclose = () => {
+        this.closed = true;
+        this.waiting = null;
+        show(shown);
+        setTimeout(() => this.connect(), 2000);
+      };
+      this.socket.onmessage = message => {
+        if (typeof message.data === 'string') this.begin(JSON.parse(message.data));
+        else this.waiting = message.data;
+      };
+    }
+    get home() { return first.scene.home; }
+    send(text) { if (this.socket.readyState === WebSocket.OPEN) this.socket.send(text); }
+    begin(data) {
+      this.edition = data.edition;
+      this.waiting = null;
+      begin([new Recording(data.scene, data.width, [])]);
+      play(true);
+    }
+    /** Shows what has come, and asks for the next by saying so. */
+    draw(now) {
+      if (!this.waiting) return;
+      this.head = Array.from(new Float64Array(this.waiting, 0, 3));
+      const picture = new Float32Array(this.waiting, 24);
+      this.waiting = null;
+      this.send('drawn');
+      if (picture.length !== first.width) return;
+      first.pictures.push(picture);
+      markOf(first.count - 1);
+      for (const c of charts) c.rows.push(c.row(first.count - 1));
+      while (first.time(0) < first.time(first.count - 1) - KEPT) {
+        first.pictures.shift();
+        for (const c of charts) c.rows.shift();
+        shown = Math.max(0, shown - 1);
+      }
+      element('seek').max = first.count - 1;
+      if (playing) show(first.count - 1);
+      if (now - this.redrawn < REDRAWN) return;
+      this.redrawn = now;
+      for (const c of charts) c.chart.updateOptions({file: c.rows});
+    }
+  }
+
   /** For tests: what the page shows now, read back from the objects that are drawn. */
   window.ves = {
-    count: first.count,
+    get count() { return first ? first.count : 0; },
+    get live() { return live; },
+    get words() { return element('words').textContent; },
     show,
     time: () => first.time(shown),
     position: name => {
@@ -292,6 +442,7 @@
       world.updateMatrixWorld(true);
       return bodies[0].frames[name].matrixWorld.toArray();
     }};
-  show(first.at(0));
+  if (window.VES_RECORDINGS.length) begin(window.VES_RECORDINGS.map(Recording.of));
+  else live = new Live();
   requestAnimationFrame(step);
 })();

@@ -9,6 +9,7 @@
 
 #include "ves/base/coordinates.hpp"
 #include "ves/control/safety_checks.hpp"
+#include "ves/math/dense.hpp"
 #include "ves/view/page.hpp"
 
 namespace ves {
@@ -50,7 +51,11 @@ std::string linkFrame(int i) { return fmt::format("link{}", i + 1); }
 
 }  // namespace
 
-Scene::Scene(const Experiment& e) : geometry_(e.plant.geometry), payload_(e.plant.payload) {
+Scene::Scene(const Experiment& e)
+    : geometry_(e.plant.geometry),
+      payload_(e.plant.payload),
+      arm_(e.arm.value_or(ArmShape())),
+      Phi_(e.controller.admittance.Phi) {
   if (e.robot.tool()) tool_ = *e.robot.tool();
   description_ = {{"name", e.name}, {"description", e.description}, {"home", geometry_.home_height},
                   {"reach", 0.0},   {"frames", Json::array()},      {"shapes", Json::array()}};
@@ -80,6 +85,7 @@ Scene::Scene(const Experiment& e) : geometry_(e.plant.geometry), payload_(e.plan
                     {"radius", 0.08},
                     {"length", payload_.X_PS.p.z()}});
   if (!e.robot.frames.empty()) addRobot();
+  addArm();
 
   const auto addPose = [&](const char* what, const double(state_t::*field)[6]) {
     for (int i = 0; i < 6; ++i)
@@ -168,6 +174,13 @@ void Scene::addRobot() {
   shapes.push_back({{"kind", "axes"}, {"frame", "tool"}, {"size", 0.15}});
 }
 
+void Scene::addArm() {
+  Json points = Json::array();
+  const Transform X_IP = geometry_.fromHome(Pose());
+  for (const Vec3& p : arm_.points) points.push_back(json(X_IP * p));
+  description_["arm"] = points;
+}
+
 std::vector<float> Scene::picture(const Row& row, const std::optional<Vec6>& base) const {
   std::vector<float> out;
   out.reserve(width());
@@ -198,6 +211,14 @@ std::vector<float> Scene::picture(const Row& row, const std::optional<Vec6>& bas
   const Transform X_PL0 = payload_.X_PL0();
   for (int i = 0; i < payload_.robot.size; ++i) put(X_PL0 * X_L0L[i]);
   if (tool_) put(X_PL0 * tool_->pose(X_L0L));
+  if (!arm_.points.empty()) {  // bent as the tip is moved
+    const Eigen::VectorXd eta = leastSquares(Phi_, x);
+    const Mat3 R_IP = geometry_.fromHome(Pose()).R;
+    for (const Eigen::Matrix3Xd& displacement : arm_.displacements) {
+      const Vec3 u = R_IP * (displacement * eta);
+      for (const double c : {u.x(), u.y(), u.z()}) out.push_back(static_cast<float>(c));
+    }
+  }
   for (const Scalar& scalar : scalars_) out.push_back(static_cast<float>(scalar.value(row)));
   return out;
 }

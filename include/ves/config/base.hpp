@@ -14,8 +14,9 @@ namespace ves {
 
 /// The base that a robot stands on, by its modes at the robot's foot.
 struct Base {
-  ModalModel modes;             // those that are kept
-  std::optional<ArmModel> arm;  // that they are of
+  ModalModel modes;               // those that are kept
+  std::optional<ArmModel> arm;    // that they are of
+  std::optional<ArmShape> shape;  // of the arm, by the same modal coordinates
 };
 
 /// One of three: `mass`, `damping`, `stiffness` (6 x 6); `modes`, a table from elsewhere; `arm`, a

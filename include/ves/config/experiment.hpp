@@ -15,6 +15,7 @@
 #include "ves/config/urdf.hpp"
 #include "ves/control/test_platform.hpp"
 #include "ves/plant/plant.hpp"
+#include "ves/srms/arm.hpp"
 #include "ves/srms/interaction.hpp"
 
 namespace ves {
@@ -26,7 +27,8 @@ struct Experiment {
   std::string description;
   ControllerConfig controller;
   plant::PlantConfig plant;
-  UrdfRobot robot;  // as configured; without frames: none
+  UrdfRobot robot;              // as configured; without frames: none
+  std::optional<ArmShape> arm;  // that the base is the tip of
   std::vector<std::string> warnings;
   std::vector<std::string> notes;                // known oddities of a robot's file
   std::optional<CalibrationRecord> calibration;  // that the bias comes from

@@ -42,11 +42,18 @@ Distance distance(const Motion& a, const Motion& b);
 /// Of a motion from where it began.
 Distance travel(const Motion& motion);
 
-/// What an emulation did, and what it is for.
-struct Emulation {
-  Motion platform;           // in the first admittance segment, without `rest`
-  Motion base;               // the robot on its base in free space (SRMS-robot, nothing left out)
+/// The robot on its base in free space (SRMS-robot, nothing left out).
+struct BaseMotion {
+  Motion base;
   Vec6 rest = Vec6::Zero();  // [m, rad] of the pose at its start, what the modes do not express
+
+  /// From home [m, rad], so many ticks after the start; none when it is over.
+  std::optional<Vec6> at(std::int64_t tick) const;
+};
+
+/// What an emulation did, and what it is for.
+struct Emulation : BaseMotion {
+  Motion platform;  // in the first admittance segment, without `rest`
 };
 
 /// The base's motions that were needed last. Runs that differ in noise, gains or filters share one:
@@ -71,14 +78,19 @@ class ReferenceMotions {
   int computed_ = 0;
 };
 
-/// From where the platform was let go; what the modes do not express of that is left out. None
-/// without admittance control, where so many modes are kept that it would take longer than the run,
-/// and where the base's motion grows without bound.
+/// In the first admittance segment of the program, let go at `start` from home. None without
+/// admittance control, where so many modes are kept that it would take longer than the run, and
+/// where the motion grows without bound.
+std::optional<BaseMotion> baseMotion(const Experiment& experiment, const Vec6& start,
+                                     ReferenceMotions& references);
+
+/// The same from where the platform was let go, beside what it did. None of a run without two ticks
+/// of it.
 std::optional<Emulation> emulation(const Series& series, ReferenceMotions& references);
 std::optional<Emulation> emulation(const Series& series);
 
 /// Where the base would be, from home [m, rad], by the tick that it is for.
-std::map<std::int64_t, Vec6> basePoses(const Series& series, const Emulation& emulation);
+std::map<std::int64_t, Vec6> basePoses(const Series& series, const BaseMotion& motion);
 
 /// A mode of base and robot together, the robot's joints locked.
 struct CoupledMode {

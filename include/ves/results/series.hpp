@@ -43,6 +43,7 @@ class RowMaker {
   std::optional<Row> add(const LogEvent& event, const std::string& log);
   void add(const truth_t& truth) { truths_.put(truth.header.sequence, truth); }
   void add(const sample_t& sample) { samples_.put(sample.header.sequence, sample); }
+  void add(const timing_t& timing);  // of the last state
   std::optional<Row> add(const state_t& state);
   /// The last one.
   std::optional<Row> finish() { return std::exchange(row_, std::nullopt); }

@@ -46,6 +46,7 @@ struct ArmModel {
   BeamModel frame;
   BeamModel::Point tip;
   Transform X_AP;
+  std::vector<BeamModel::Point> ends;  // of the beams' elements, the root first
 };
 ArmModel assemble(const ArmDescription& arm);
 
@@ -58,8 +59,20 @@ Mat6 tipCompliance(const ArmModel& arm);
 /// [Hz] of a payload on the arm's compliance, the arm's own mass ignored.
 Vec6 masslessFrequencies(const ArmModel& arm, const RigidBody& payload_P);
 
-/// The softest `keep` modes (all when 0) as shapes of the tip, in P. Throws std::domain_error when
-/// something of the frame has no mass.
-ModalModel tipModes(const ArmModel& arm, double damping_ratio, int keep = 0);
+/// The line of an arm, in P where the tip is at rest: bent by eta, point i is at
+/// points[i] + displacements[i] eta.
+struct ArmShape {
+  std::vector<Vec3> points;                     // [m] root first
+  std::vector<Eigen::Matrix3Xd> displacements;  // [m] a modal coordinate, 3 x k
+};
+
+struct ArmModes {
+  ModalModel tip;  // shapes of the tip, in P
+  ArmShape shape;  // by the same coordinates
+};
+
+/// The softest `keep` modes (all when 0). Throws std::domain_error when something of the frame has
+/// no mass.
+ArmModes armModes(const ArmModel& arm, double damping_ratio, int keep = 0);
 
 }  // namespace ves

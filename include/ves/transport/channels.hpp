@@ -15,6 +15,7 @@ inline const std::string kTruth = "VES_TRUTH";
 inline const std::string kTiming = "VES_TIMING";
 inline const std::string kRobot = "VES_ROBOT";
 inline const std::string kOperator = "VES_OPERATOR";
+inline const std::string kQuery = "VES_QUERY";
 inline const std::string kExperiment = "VES_EXPERIMENT";
 
 }  // namespace ves::channel

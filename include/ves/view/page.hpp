@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// The page that shows runs, as one file that a browser opens from disk.
+// The page that shows runs, as one file.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -15,5 +15,8 @@ std::string base64(const std::vector<float>& numbers);
 /// The page with everything inside: three.js and dygraphs of this machine, and the recordings (see
 /// recording()). Throws InputError when those libraries are not installed.
 std::string page(const std::vector<nlohmann::ordered_json>& recordings);
+
+/// The same, for what a WebServer sends.
+std::string livePage();
 
 }  // namespace ves

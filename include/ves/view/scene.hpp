@@ -20,18 +20,22 @@ class Scene {
   explicit Scene(const Experiment& experiment);
 
   /// What stays: "name", "frames" (name and parent of each, in the order of a picture's poses),
-  /// "shapes" (kind, frame, sizes [m]), "scalars" (names), "phases", "segments", "checks".
+  /// "shapes" (kind, frame, sizes [m]), "arm" (the line of the arm at rest, in I [m]), "scalars"
+  /// (names), "phases", "segments", "checks".
   const nlohmann::ordered_json& description() const { return description_; }
 
   /// One instant, as many numbers as width(): seven a frame {p [m], quaternion x y z w} in its
-  /// parent, then the scalars. NaN where nobody knows. `base`: the pose of the base in free space,
-  /// from home.
+  /// parent, three [m] for each point of the arm, by which it is bent, then the scalars. NaN where
+  /// nobody knows. `base`: the pose of the base in free space, from home.
   std::vector<float> picture(const Row& row, const std::optional<Vec6>& base) const;
-  std::size_t width() const { return 7 * frames_.size() + scalars_.size(); }
+  std::size_t width() const {
+    return 7 * frames_.size() + 3 * arm_.points.size() + scalars_.size();
+  }
 
  private:
   void addFrame(const std::string& name, const std::string& parent);
   void addRobot();
+  void addArm();
 
   struct Scalar {
     std::string name;
@@ -40,6 +44,8 @@ class Scene {
   Geometry geometry_;
   Payload payload_;
   std::optional<NamedFrame> tool_;
+  ArmShape arm_;         // without points: none
+  Eigen::MatrixXd Phi_;  // 6 x k, of the base's tip
   std::vector<std::string> frames_;
   std::vector<Scalar> scalars_;
   nlohmann::ordered_json description_;
