@@ -41,12 +41,12 @@ const std::map<std::string, Names> kMayInclude = [] {
   add("transport", {"simulation"}, "config");
   add("run", {"realtime"}, "transport");
   add("results", {"identification"}, "run");
-  add("validation", {}, "results");
+  add("view", {}, "results");
+  add("validation", {}, "view");
   add("doctor", {}, "run");
   add("sweep", {}, "results");
   add("faults", {}, "run");
   add("console", {}, "results");
-  add("view", {}, "results");
   return may;
 }();
 

@@ -6,13 +6,18 @@
 #include <unistd.h>
 
 #include <cmath>
+#include <cstring>
 #include <set>
 
 #include "support/refusal.hpp"
 #include "support/rig.hpp"
+#include "ves/results/marks.hpp"
 #include "ves/results/tool_motion.hpp"
+#include "ves/transport/channels.hpp"
+#include "ves/view/live_run.hpp"
 #include "ves/view/page.hpp"
 #include "ves/view/scene.hpp"
+#include "ves/view/still.hpp"
 #include "ves/view/web_server.hpp"
 
 namespace ves {
@@ -173,6 +178,64 @@ TEST(BaseMotion, IsKnownFromItsStartToItsEnd) {
   EXPECT_EQ(*live->at(last), *emulated->at(last));
 }
 
+TEST(Still, IsADrawingOfEveryBody) {
+  const Experiment e = test::experiment("srms_low_hover_puma");
+  const auto count = [](const std::string& text, const char* what) {
+    std::size_t n = 0;
+    for (std::size_t at = 0; (at = text.find(what, at)) != std::string::npos; ++at) ++n;
+    return n;
+  };
+  const std::string platform = stillAtStart(e, StillView::kPlatform),
+                    arm = stillAtStart(e, StillView::kArm);
+  EXPECT_EQ(count(platform, "<polygon"), 2u);  // two plates
+  EXPECT_EQ(count(arm, "<line"), count(platform, "<line") + 21u);
+  EXPECT_EQ(count(platform, "nan"), 0u);
+  // What is seen of the arm is larger: by its length, 15 m.
+  const auto width = [](const std::string& svg) {
+    double x, y, w, h;
+    EXPECT_EQ(std::sscanf(svg.c_str(), "<svg viewBox=\"%lf %lf %lf %lf", &x, &y, &w, &h), 4);
+    return std::max(w, h);
+  };
+  EXPECT_LT(width(platform), 5.0);
+  EXPECT_GT(width(arm), 7.0);
+}
+
+TEST(Marks, AreWhereSegmentsAndTheRobotBegin) {
+  const RecordedRun run = puma();
+  const std::vector<Mark> segments = segmentMarks(run.series);
+  ASSERT_GE(segments.size(), 5u);
+  const auto admittance = std::find_if(segments.begin(), segments.end(),
+                                       [](const Mark& m) { return m.name == "admittance"; });
+  ASSERT_NE(admittance, segments.end());
+  double start = NAN;
+  eachTick(run.series, [&](const Row& row, double t) {
+    if (t == 0.0) start = row.t;
+  });
+  EXPECT_EQ(admittance->x, start);
+  EXPECT_EQ(segments.back().name, "parked");
+  EXPECT_TRUE(robotMarks(run.series.experiment, 0).empty());
+  const std::vector<Mark> robot = robotMarks(run.series.experiment, 2);
+  ASSERT_EQ(robot.size(), 2u);
+  EXPECT_EQ(robot[0].name, "joint_2");
+  EXPECT_EQ(robot[0].x, 0.0);
+  EXPECT_EQ(robot[1].name, "at rest");
+  EXPECT_EQ(robot[1].x, 1.0);
+  const Experiment two = test::experiment(
+      "puma_on_table_4_1",
+      {"program=[{move: {}}, {calibration: {}}, {admittance: {duration_s: 9}, robot: [{at_s: 0, "
+       "duration_s: 1, joint: joint_2, to_deg_or_m: -60}, {at_s: 0, duration_s: 3, joint: joint_1, "
+       "to_deg_or_m: 10}, {at_s: 2, duration_s: 0.5, joint: joint_2, to_deg_or_m: -50}, {at_s: 5, "
+       "duration_s: 1, joint: joint_2, to_deg_or_m: -60}]}]"});
+  std::string said;
+  for (const Mark& m : robotMarks(two, 2)) said += fmt::format("{}: {}; ", m.x, m.name);
+  EXPECT_EQ(said, "0: joint_2, joint_1; 2: joint_2; 3: at rest; 5: joint_2; 6: at rest; ");
+  // Names that would lie over each other are left out.
+  const std::string lines = markLines({{1.0, "a"}, {1.01, "b"}, {2.0, "c"}}, 10.0);
+  EXPECT_NE(lines.find("'a'"), std::string::npos);
+  EXPECT_EQ(lines.find("'b'"), std::string::npos);
+  EXPECT_NE(lines.find("'c'"), std::string::npos);
+}
+
 TEST(Page, BytesAreWrittenAsRfc4648Does) {
   // 0.0f is four zero bytes, 1.0f 00 00 80 3f.
   EXPECT_EQ(base64({}), "");
@@ -189,6 +252,126 @@ TEST(Page, HasAPictureForEveryInstantThatCanBeSeen) {
   const std::size_t pictures = numbers / shown["width"].get<std::size_t>();
   EXPECT_NEAR(static_cast<double>(pictures), 0.5 * static_cast<double>(run.series.rows.size()),
               2.0);
+}
+
+// --- Live, in a network of its own
+// -----------------------------------------------------------------
+
+class Live : public testing::Test {
+ protected:
+  static void SetUpTestSuite() { enterPrivateBus(); }
+
+  Live() {
+    controllers.subscribe(channel::kQuery,
+                          [this](const std::string&, const void*, std::uint32_t) { ++queries; });
+    controllers.subscribe(channel::kOperator,
+                          [this](const std::string&, const void* data, std::uint32_t size) {
+                            const auto m = decode<operator_t>(data, size);
+                            ASSERT_TRUE(m);
+                            EXPECT_EQ(m->request, static_cast<int>(Request::kStop));
+                            EXPECT_EQ(m->controller, 9);
+                            orders.insert({m->header.source, m->header.sequence});
+                            ++stops;
+                            last = *m;
+                          });
+  }
+
+  /// A state of a controller that began at `epoch`.
+  void tell(std::int64_t source, std::int64_t epoch, std::int64_t number, bool engaged) {
+    state_t state{};
+    state.header = header({source, epoch}, number, 0);
+    state.phase = static_cast<int>(engaged ? Phase::kRunning : Phase::kDisarmed);
+    state.segment = -1;
+    state.cause = static_cast<int>(Check::kCount);
+    state.engaged = engaged;
+    state.order_source = last.header.source;
+    state.order_sequence = answers ? last.header.sequence : -1;
+    controllers.publish(channel::kState, state);
+  }
+  void describe(std::int64_t source, std::int64_t epoch) {
+    experiment_t e = ves::describe(test::experiment("free_decay"), {source, epoch}, 0);
+    controllers.publish(channel::kExperiment, e);
+  }
+  /// Goes on, a tick every 10 ms, until `done`.
+  void until(std::int64_t source, std::int64_t epoch, bool engaged,
+             const std::function<bool()>& done) {
+    for (int i = 0; i < 500 && !done(); ++i) {
+      tell(source, epoch, tick++, engaged);
+      controllers.wait(10);
+      controllers.drain();
+      live.listen();
+    }
+    ASSERT_TRUE(done());
+  }
+  double scalar(const char* name) {
+    const auto scene = nlohmann::json::parse(live.scene());
+    const auto& d = scene["scene"];
+    std::size_t at = 7 * d["frames"].size() + 3 * d["arm"].size();
+    for (const auto& one : d["scalars"]) {
+      if (one == name) break;
+      ++at;
+    }
+    const std::string bytes = live.picture();
+    EXPECT_EQ(bytes.size(), 24 + 4 * scene["width"].get<std::size_t>());
+    float value = NAN;
+    std::memcpy(&value, bytes.data() + 24 + 4 * at, sizeof value);
+    return value;
+  }
+
+  Bus controllers{kDefaultUrl};
+  LiveRun live{kDefaultUrl};
+  std::int64_t queries = 0, stops = 0, tick = 700;
+  std::set<std::pair<std::int64_t, std::int64_t>> orders;
+  operator_t last{};
+  bool answers = true;
+};
+
+TEST_F(Live, WhoJoinsLateAsksForTheConfigurationAndHasTheSameTime) {
+  until(9, 100, true, [&] { return queries > 0; });
+  EXPECT_EQ(live.edition(), 0);
+  EXPECT_TRUE(live.picture().empty());
+  describe(8, 100);  // somebody else's
+  until(9, 100, true, [&] { return queries > 1; });
+  EXPECT_EQ(live.edition(), 0);
+  describe(9, 100);
+  until(9, 100, true, [&] { return live.newest() > 3; });
+  EXPECT_EQ(live.edition(), 1);
+  EXPECT_NEAR(scalar("t_s"), 0.01 * static_cast<double>(tick), 0.05);
+  EXPECT_GT(scalar("t_s"), 6.9);
+}
+
+TEST_F(Live, ShowsTheControllerThatHasTheLegs) {
+  describe(9, 100);
+  until(9, 100, true, [&] { return live.edition() == 1 && live.newest() > 0; });
+  // A younger one that is not engaged, and an older one that is.
+  for (int i = 0; i < 20; ++i) {
+    describe(10, 200);
+    tell(10, 200, i, false);
+    tell(7, 50, i, true);
+    until(9, 100, true, [n = 0]() mutable { return ++n > 3; });
+  }
+  EXPECT_EQ(live.edition(), 1);
+  describe(10, 200);
+  until(10, 200, true, [&] { return live.edition() == 2; });  // it has the legs, and is the newest
+}
+
+TEST_F(Live, AStopIsRepeatedUntilItIsTakenAndIsOneOrder) {
+  answers = false;
+  describe(9, 100);
+  until(9, 100, true, [&] { return live.newest() > 0; });
+  live.requestStop(2);  // of a scene that is not shown
+  until(9, 100, true, [n = 0]() mutable { return ++n > 50; });
+  EXPECT_EQ(stops, 0);
+  live.requestStop(1);
+  live.requestStop(1);
+  until(9, 100, true, [&] { return stops >= 3; });
+  EXPECT_EQ(scalar("stop_requested"), 1.0);
+  answers = true;
+  until(9, 100, true, [&] { return scalar("stop_requested") == 2.0; });
+  const std::int64_t sent = stops;
+  until(9, 100, true, [n = 0]() mutable { return ++n > 100; });
+  EXPECT_EQ(stops, sent);
+  EXPECT_EQ(orders.size(), 1u);
 }
 
 }  // namespace

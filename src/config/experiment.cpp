@@ -218,10 +218,7 @@ std::string applyStabilityCheck(Experiment& e) {
 
 Interaction interactionOf(const Experiment& experiment, std::int64_t& duration) {
   const Program& program = experiment.controller.program;
-  int segment = 0;
-  while (segment < program.size &&
-         program.segments[static_cast<std::size_t>(segment)].kind != SegmentKind::kAdmittance)
-    ++segment;
+  const int segment = admittanceSegment(program);
   if (segment == program.size)
     throw InputError(
         fmt::format("{}: no admittance segment, want one in its program", experiment.name));

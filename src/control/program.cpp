@@ -18,11 +18,17 @@ std::string_view name(SegmentKind kind) noexcept {
   return "none";
 }
 
+int admittanceSegment(const Program& program) noexcept {
+  const auto begin = program.segments.begin(), end = begin + program.size;
+  return static_cast<int>(std::find_if(begin, end,
+                                       [](const Segment& segment) {
+                                         return segment.kind == SegmentKind::kAdmittance;
+                                       }) -
+                          begin);
+}
+
 bool wantsAdmittance(const Program& program) noexcept {
-  const auto begin = program.segments.begin();
-  return std::any_of(begin, begin + program.size, [](const Segment& segment) {
-    return segment.kind == SegmentKind::kAdmittance;
-  });
+  return admittanceSegment(program) < program.size;
 }
 
 std::string_view name(Request request) noexcept {

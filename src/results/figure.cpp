@@ -63,6 +63,9 @@ std::string svg(const std::vector<Panel>& panels) {
     const auto [low, high] = range(panel);
     const double span = high > low ? high - low : 1.0;  // room for the key above
     script += fmt::format("set yrange [{}:{}]\n", low - 0.05 * span, high + 0.16 * span);
+    script += markLines(panel.marks, panel.lines.empty() || panel.lines[0].x.empty()
+                                         ? 0.0
+                                         : panel.lines[0].x.back() - panel.lines[0].x.front());
     std::string plot;
     for (std::size_t i = 0; i < panel.lines.size(); ++i) {
       const Line& line = panel.lines[i];
@@ -98,6 +101,8 @@ std::string svg(const std::vector<Panel>& panels) {
                                 {"stroke='rgb(  0, 114, 178)'", "class=\"c0\""},
                                 {"stroke='rgb(213,  94,   0)'", "class=\"c1\""},
                                 {"stroke='rgb(  0, 158, 115)'", "class=\"c2\""},
+                                {"stroke='rgb(112, 112, 112)'", "class=\"mark\""},
+                                {"fill=\"rgb(112,112,112)\"", "class=\"mark-text\""},
                                 {"stroke='rgb(128, 128, 128)'", ""}};
   for (const auto& [from, to] : ink) replaceAll(out, from, to);
   return out;
@@ -107,7 +112,8 @@ std::string svgFile(const std::vector<Panel>& panels) {
   std::string out = svg(panels);
   if (out.rfind("<svg", 0) != 0) throw InputError("gnuplot has drawn nothing; is it installed?");
   out.insert(out.find('>') + 1,
-             "\n<style>.ink { stroke: #1b1f24; } .ink-text { fill: #1b1f24; } .gridline { stroke: "
+             "\n<style>.ink { stroke: #1b1f24; } .ink-text { fill: #1b1f24; } .mark { stroke: "
+             "#57606a; } .mark-text { fill: #57606a; } .gridline { stroke: "
              "#d0d7de; } .c0 { stroke: #0067a8; } .c1 { stroke: #c14e00; } .c2 { stroke: #00805e; "
              "}</style>\n<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>");
   return out;

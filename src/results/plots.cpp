@@ -8,12 +8,14 @@
 #include <functional>
 #include <iterator>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "thinning.hpp"
 #include "ves/base/coordinates.hpp"
 #include "ves/results/drift_samples.hpp"
 #include "ves/results/gnuplot.hpp"
+#include "ves/results/marks.hpp"
 
 namespace ves {
 namespace {
@@ -35,8 +37,8 @@ struct Curve {
 /// series.csv once for each.
 class Page {
  public:
-  Page(const Series& series, const std::string& file, const std::string& title, Span span, int rows,
-       int cols)
+  Page(const Series& series, const std::vector<Mark>& marks, const std::string& file,
+       const std::string& title, Span span, int rows, int cols)
       : series_(series), span_(span), panels_(rows * cols), cols_(cols) {
     script_ = fmt::format(
         "reset\nset terminal pngcairo noenhanced size 1500,{} font 'DejaVu Sans,12' background "
@@ -49,6 +51,7 @@ class Page {
         "set offsets graph 0,0,0.18,0.05\n",
         rows == 1 ? 480 : 800, quoted(file), rows, cols, quoted(title), rows == 1 ? 0.14 : 0.085,
         span.from, span.to);
+    script_ += markLines(marks, span.to - span.from);
   }
 
   void panel(const std::string& ylabel, const std::vector<Curve>& curves) {
@@ -67,7 +70,7 @@ class Page {
       script_ += "EOD\n";
     }
     script_ += fmt::format("set ylabel {} offset 1\nset xlabel {}\nplot ", quoted(ylabel),
-                           quoted(bottom ? "time [s]" : ""));
+                           quoted(bottom ? "time since the first tick [s]" : ""));
     for (std::size_t i = 0; i < curves.size(); ++i)
       script_ += fmt::format("{}$curve{} with lines lw {} dt {} lc rgb '{}' title {}",
                              i ? ", " : "", i, curves[i].dashed ? 1.5 : 2.0,
@@ -122,6 +125,19 @@ std::string driftPage(const std::vector<DriftSample>& samples, const std::string
   return script + "unset multiplot\nunset output\n";
 }
 
+/// Of every segment that ran.
+std::vector<Mark> robotStarts(const Series& series) {
+  std::vector<Mark> out;
+  int segment = -1;
+  for (const Row& row : series.rows) {
+    if (!in(row, Phase::kRunning) || row.state.segment == std::exchange(segment, row.state.segment))
+      continue;
+    for (const Mark& mark : robotMarks(series.experiment, segment))
+      out.push_back({row.t + mark.x, mark.name});
+  }
+  return out;
+}
+
 /// The pictures that gnuplot has drawn.
 std::vector<std::filesystem::path> draw(const std::string& script,
                                         const std::vector<std::string>& files,
@@ -169,6 +185,11 @@ std::vector<std::filesystem::path> drawPlots(const Series& series,
   const auto name = [](int i, const char* what) {
     return fmt::format("{}_{}_{}", coordinate(i).name, what, coordinate(i).unit);
   };
+  std::vector<Mark> marks = segmentMarks(series);
+  const std::vector<Mark> robot = robotStarts(series);
+  marks.insert(marks.end(), robot.begin(), robot.end());
+  std::erase_if(marks, [&](const Mark& m) { return m.x < program.from; });
+  marks = merged(marks);
   std::string script;
   std::vector<std::string> files;
   const auto finish = [&](const std::string& file, const Page& page) {
@@ -176,8 +197,8 @@ std::vector<std::filesystem::path> drawPlots(const Series& series,
     script += page.script();
   };
 
-  Page pose(series, "pose.png", experiment.name + ": pose of the platform, from home", program, 2,
-            3);
+  Page pose(series, marks, "pose.png", experiment.name + ": pose of the platform, from home",
+            program, 2, 3);
   for (int i = 0; i < 6; ++i) {
     const double scale = coordinate(i).shown;
     pose.panel(fmt::format("{} [{}]", coordinate(i).name, coordinate(i).shown_unit),
@@ -186,7 +207,8 @@ std::vector<std::filesystem::path> drawPlots(const Series& series,
   }
   finish("pose.png", pose);
 
-  Page error(series, "error.png", experiment.name + ": commanded minus actual pose", program, 1, 2);
+  Page error(series, marks, "error.png", experiment.name + ": commanded minus actual pose", program,
+             1, 2);
   for (int half = 0; half < 2; ++half) {
     std::vector<Curve> curves;
     for (int i = 3 * half; i < 3 * half + 3; ++i)
@@ -199,7 +221,7 @@ std::vector<std::filesystem::path> drawPlots(const Series& series,
   finish("error.png", error);
 
   if (calibrated.from >= 0.0) {
-    Page wrench(series, "wrench.png",
+    Page wrench(series, marks, "wrench.png",
                 experiment.name + ": wrench on the platform, gravity compensated, about {P} in {I}",
                 calibrated, 1, 2);
     for (int half = 0; half < 2; ++half) {
@@ -213,7 +235,7 @@ std::vector<std::filesystem::path> drawPlots(const Series& series,
     finish("wrench.png", wrench);
   }
 
-  Page legs(series, "legs.png", experiment.name + ": leg lengths", program, 2, 3);
+  Page legs(series, marks, "legs.png", experiment.name + ": leg lengths", program, 2, 3);
   for (int i = 1; i <= kLegs; ++i)
     legs.panel(
         fmt::format("leg {} [mm]", i),
@@ -223,8 +245,8 @@ std::vector<std::filesystem::path> drawPlots(const Series& series,
   finish("legs.png", legs);
 
   if (tool && !tool->tick.empty()) {
-    Page page(series, "tool.png", experiment.name + ": the tool, carried by the base", program, 1,
-              2);
+    Page page(series, marks, "tool.png", experiment.name + ": the tool, carried by the base",
+              program, 1, 2);
     const auto between = [&](const std::vector<Transform>& a, const std::vector<Transform>& b) {
       std::map<std::int64_t, Vec3> off;  // [m] by tick
       for (std::size_t k = 0; k < tool->tick.size(); ++k) off[tool->tick[k]] = a[k].p - b[k].p;

@@ -148,7 +148,7 @@ void oneOnTheArm(Reproduction& r, const Run43& which, TableRow& row, TableRow& d
 
 void onTheArm(Reproduction& r) {
   TableRows rows(kRuns), damping(kRuns);
-  Panel distances{"time [s]", "distance [mm]", {}, false};
+  Panel distances{kSinceAdmittance, "distance [mm]", {}, false};
   r.parts(kRuns, [&](Reproduction& piece, std::size_t i) {
     oneOnTheArm(piece, runOf(i), rows[i], damping[i], distances);
   });

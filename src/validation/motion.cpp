@@ -31,7 +31,7 @@ void trajectories(Reproduction& r) {
       return (row.state.x_desired[i] - row.truth.x[i]) * coordinate(i).shown;
     };
   };
-  panels.push_back({"time [s]",
+  panels.push_back({kSinceSegment,
                     "z error [mm]",
                     {lineOf("", z.series, SegmentKind::kTrajectory, 0, error(2))},
                     false});
@@ -43,7 +43,7 @@ void trajectories(Reproduction& r) {
   r.claim("alpha_hardware",
           {{"error_deg", most / kDegree}, {"percent", 100.0 * most / (20 * kDegree)}});
   panels = tracking(alpha.series, SegmentKind::kTrajectory, {3});
-  panels.push_back({"time [s]",
+  panels.push_back({kSinceSegment,
                     "alpha error [deg]",
                     {lineOf("", alpha.series, SegmentKind::kTrajectory, 0, error(3))},
                     false});

@@ -28,12 +28,14 @@ th, td { text-align: left; vertical-align: top; padding: .3rem .6rem .3rem 0;
 table.numbers { font-size: .78rem; } table.numbers td { white-space: nowrap; }
 table.numbers td:not(:first-child), table.numbers th:not(:first-child) { text-align: right; padding: .3rem 0 .3rem .7rem; }
 figure { margin: 1rem 0; } figure svg { width: 100%; height: auto; display: block; }
+.drawings { display: flex; gap: 1rem; } .drawings div { flex: 1; } .drawings svg { max-height: 22rem; }
 figcaption { font-size: .85rem; color: var(--soft); }
 .claim { border-left: 3px solid var(--line); padding: .1rem 0 .1rem .9rem; margin: .8rem 0; font-size: .92rem; }
 .claim p { margin: .25rem 0; } .claim .says { color: var(--soft); }
 .verdict { font-weight: 600; white-space: nowrap; } .agrees { color: var(--agrees); }
 .differs { color: var(--differs); } .open { color: var(--open); }
-svg .ink { stroke: var(--ink); } svg .ink-text { fill: var(--ink); } svg .gridline { stroke: var(--line); }
+svg .ink { stroke: var(--ink); } svg .ink-text { fill: var(--ink); } svg .mark { stroke: var(--soft); }
+svg .mark-text { fill: var(--soft); } svg .gridline { stroke: var(--line); }
 svg .c0 { stroke: var(--c0); } svg .c1 { stroke: var(--c1); } svg .c2 { stroke: var(--c2); }
 @media print { :root { --ink: #000; --back: #fff; --line: #bbb; --c0: #0067a8; --c1: #c14e00; --c2: #00805e; }
   body { margin: 0; max-width: none; font-size: 10pt; } figure, .claim, tr { break-inside: avoid; }
@@ -86,6 +88,14 @@ std::vector<Claim> Page::claims() const {
   std::vector<Claim> all;
   for (const Section& s : sections_) all.insert(all.end(), s.claims.begin(), s.claims.end());
   return all;
+}
+
+void Page::drawings(const std::string& caption, const std::vector<std::string>& svgs) {
+  std::string all;
+  for (const std::string& one : svgs) all += "<div>" + one + "</div>";
+  last().body +=
+      fmt::format("<figure><div class=\"drawings\">{}</div><figcaption>{}</figcaption></figure>\n",
+                  all, escaped(caption));
 }
 
 void Page::figure(const std::string& caption, const std::vector<Panel>& panels) {

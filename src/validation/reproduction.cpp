@@ -93,7 +93,7 @@ std::vector<Panel> tracking(const Series& series, SegmentKind kind, const std::v
     const Coordinate& c = coordinate(i);
     const auto desired = [&c, i](const Row& r) { return r.state.x_desired[i] * c.shown; };
     const auto is = [&c, i](const Row& r) { return r.truth.x[i] * c.shown; };
-    panels.push_back({"time [s]",
+    panels.push_back({kSinceSegment,
                       fmt::format("{} [{}]", c.name, c.shown_unit),
                       {lineOf("actual", series, kind, 0, is),
                        lineOf("commanded", series, kind, 1, desired, true)},

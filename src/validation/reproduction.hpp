@@ -26,6 +26,8 @@ using Overrides = std::vector<std::string>;
 using TableRow = std::vector<std::string>;
 using TableRows = std::vector<TableRow>;
 
+inline constexpr const char* kSinceSegment = "time since the segment began [s]";
+inline constexpr const char* kSinceAdmittance = "time since admittance control began [s]";
 inline constexpr double kMilli = 1e3;  // [1/m] millimetres
 inline constexpr const char* kConfigurations[] = {"unberth", "low_hover", "deploy", "capture"};
 inline constexpr const char* kRobots[] = {"puma", "doss"};

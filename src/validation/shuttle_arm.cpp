@@ -4,6 +4,7 @@
 
 #include "reproduction.hpp"
 #include "ves/analysis/loop.hpp"
+#include "ves/view/still.hpp"
 
 namespace ves {
 namespace {
@@ -49,8 +50,12 @@ Motion simulated(const Experiment& e, InteractionModel model) {
 }
 
 /// Both motions in one panel: six lines of three coordinates.
-Panel bothIn(const Motion& srms, const Motion& ves, bool position) {
-  Panel panel{"time [s]", position ? "position [mm]" : "orientation [deg]", {}, false};
+Panel bothIn(const Motion& srms, const Motion& ves, const Experiment& e, bool position) {
+  Panel panel{kSinceAdmittance,
+              position ? "position [mm]" : "orientation [deg]",
+              {},
+              false,
+              robotMarks(e, admittanceSegment(e.controller.program))};
   for (const bool platform : {false, true}) {
     const Motion& m = platform ? ves : srms;
     for (int i = position ? 0 : 3; i < (position ? 3 : 6); ++i) {
@@ -130,8 +135,8 @@ void onTheMachine(Reproduction& r, const std::string& configuration, const std::
         distances.push_back(mm(d.rms_position) + " / " + mm(d.peak_position));
         attitudes.push_back(milliradians(d.rms_attitude) + " / " + milliradians(d.peak_attitude));
         if (filters != "outputs" || place != "space") continue;
-        panels.push_back(bothIn(srms, ves, true));
-        panels.push_back(bothIn(srms, ves, false));
+        panels.push_back(bothIn(srms, ves, run.series.experiment, true));
+        panels.push_back(bothIn(srms, ves, run.series.experiment, false));
         if (noise == "quiet" && robot == "puma")
           all.worst_puma = std::max(all.worst_puma, d.rms_position / travelled.peak_position);
       }
@@ -257,6 +262,11 @@ void shuttleArmSection(Reproduction& r) {
       "wrench measured, the modes stepped at 100 Hz, the platform moved. Both keep the same modes: "
       "as many as the machine's loop holds stable. Distances are of the commanded motion, as in "
       "the report, and Euclidean.");
+  const Experiment shown = r.load("srms_low_hover_puma");
+  r.page.drawings(
+      "The PUMA 560 on the platform, and on the arm whose tip the platform pretends to be "
+      "(low hover).",
+      {stillAtStart(shown, StillView::kPlatform), stillAtStart(shown, StillView::kArm)});
   EightRuns runs[kRuns], all;
   r.parts(kRuns, [&](Reproduction& piece, std::size_t i) {
     const auto& [configuration, robot] = runOf(i);

@@ -13,12 +13,9 @@ import re
 import socket
 import struct
 import subprocess
-import tempfile
 import time
-import unittest
 
 import numpy as np
-from selenium.webdriver.support.ui import WebDriverWait
 
 import support
 
@@ -75,30 +72,10 @@ class Frames:
         return self.got[-1]
 
 
-class Live(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        cls.folder = tempfile.TemporaryDirectory()
-        cls.out = pathlib.Path(cls.folder.name)
-        cls.browser = support.browser(cls.out / "chromium")
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.browser.quit()
-        cls.folder.cleanup()
-
-    def ask(self, script, *values):
-        return self.browser.execute_script("return " + script, *values)
-
+class Live(support.Page):
     def open(self, run):
         self.browser.get(run.url)
         self.until("window.ves !== undefined && ves.count > 1")
-
-    def until(self, script):
-        WebDriverWait(self.browser, 60, 0.1).until(lambda b: self.ask(script))
-
-    def shot(self, name):
-        self.browser.save_screenshot(str(support.options.shots / (name + ".png")))
 
     def test_draws_what_happens(self):
         run = Run(self.out / "live")

@@ -16,6 +16,7 @@ import numpy as np
 from selenium import webdriver
 from selenium.webdriver.chrome.options import Options
 from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.support.ui import WebDriverWait
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 options = argparse.Namespace()
@@ -112,6 +113,33 @@ def poses(row, home):
     return out
 
 
+class Page(unittest.TestCase):
+    """A folder, and a browser that keeps its page from test to test."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.out = pathlib.Path(cls.folder.name)
+        cls.browser = browser(cls.out / "chromium")
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.browser.quit()
+        cls.folder.cleanup()
+
+    @classmethod
+    def ask(cls, script, *values):
+        return cls.browser.execute_script("return " + script, *values)
+
+    @classmethod
+    def until(cls, script):
+        WebDriverWait(cls.browser, 60, 0.1).until(lambda b: cls.ask(script))
+
+    @classmethod
+    def shot(cls, name):
+        cls.browser.save_screenshot(str(options.shots / (name + ".png")))
+
+
 class WebSocket:
     """RFC 6455, as much as a test needs; `status` of the answer to the handshake."""
 
@@ -169,10 +197,13 @@ class WebSocket:
         self.socket.sendall(head + mask + bytes(b ^ mask[i % 4] for i, b in enumerate(payload)))
 
     def closed(self):
-        """Waits until the other side has closed; false when it goes on talking for 50 messages."""
+        """Waits until the other side has closed; false when it goes on talking, or is silent for 5 s."""
+        self.socket.settimeout(5)
         try:
             for _ in range(50):
                 self.read()
+        except TimeoutError:
+            return False
         except OSError:
             return True
         return False

@@ -9,20 +9,16 @@ kinematics of the URDF that is written here. Debian's chromium, chromium-driver,
 python3-numpy.
 """
 import pathlib
-import tempfile
-import unittest
 
 import numpy as np
-from selenium.webdriver.support.ui import WebDriverWait
 
 import support
 
 
-class View(unittest.TestCase):
+class View(support.Page):
     @classmethod
     def setUpClass(cls):
-        cls.folder = tempfile.TemporaryDirectory()
-        cls.out = pathlib.Path(cls.folder.name)
+        super().setUpClass()
         log = cls.out / "run.lcmlog"
         cls.page = cls.out / "run.html"
         for arguments in (["run", "puma_on_table_4_1", "--lockstep", "--no-plots", "--quiet", "--out", cls.out],
@@ -30,21 +26,8 @@ class View(unittest.TestCase):
             if support.ves(*arguments).wait() != 0:
                 raise RuntimeError(arguments)
         cls.rows = support.rows(cls.out, "t_s")
-        cls.browser = support.browser(cls.out / "chromium")
         cls.browser.get(cls.page.as_uri())
-        WebDriverWait(cls.browser, 60).until(
-            lambda b: b.execute_script("return window.ves !== undefined && ves.count > 1"))
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.browser.quit()
-        cls.folder.cleanup()
-
-    def ask(self, script, *values):
-        return self.browser.execute_script("return " + script, *values)
-
-    def shot(self, name):
-        self.browser.save_screenshot(str(support.options.shots / (name + ".png")))
+        cls.until("window.ves !== undefined && ves.count > 1")
 
     def test_no_errors(self):
         self.assertEqual(support.errors(self.browser), [])
@@ -74,7 +57,7 @@ class View(unittest.TestCase):
         self.browser.find_element("id", "back").click()
         self.assertEqual(self.ask("ves.time()"), before)
         self.browser.find_element("id", "play").click()
-        WebDriverWait(self.browser, 60).until(lambda b: self.ask("ves.time()") > before + 0.2)
+        self.until(f"ves.time() > {before + 0.2}")
         self.browser.find_element("id", "play").click()
 
     def test_pictures_are_not_empty(self):

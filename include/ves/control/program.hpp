@@ -45,6 +45,9 @@ struct Cue {
   std::int64_t after = 0;  // [ns]
 };
 
+/// The first of its segments that is admittance control; its size when none is.
+int admittanceSegment(const Program& program) noexcept;
+
 /// One of its segments is admittance control.
 bool wantsAdmittance(const Program& program) noexcept;
 

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "ves/results/marks.hpp"
+
 namespace ves {
 
 struct Line {
@@ -19,6 +21,7 @@ struct Panel {
   std::string x_label, y_label;
   std::vector<Line> lines;
   bool log_x = false;
+  std::vector<Mark> marks = {};  // lines from below to above
 };
 
 /// One figure as SVG to stand in a page, panels side by side, two a row. Drawn by gnuplot; a

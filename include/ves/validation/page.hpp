@@ -20,6 +20,8 @@ class Page {
   /// Adds the claim here, and to the table on top.
   void claim(const Claim& claim);
   void figure(const std::string& caption, const std::vector<Panel>& panels);
+  /// Drawings beside each other, as SVG.
+  void drawings(const std::string& caption, const std::vector<std::string>& svgs);
   void table(const std::vector<std::string>& header,
              const std::vector<std::vector<std::string>>& rows);
 
