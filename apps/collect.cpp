@@ -8,18 +8,53 @@
 #include "app.hpp"
 #include "commands.hpp"
 #include "ves/results/series.hpp"
+#include "ves/run/bus_recorder.hpp"
+#include "ves/transport/channels.hpp"
 #include "ves/view/ros2.hpp"
 
 namespace ves::app {
 
+namespace {
+
+/// A whole log, or the run on the bus as it happens.
+int writeMcap(const std::string& log, const std::string& url, const std::string& file) {
+  std::optional<McapExport> out;
+  const auto begin = [&](const experiment_t& m) {
+    out.emplace(parseExperiment(m.resolved, channel::kExperiment), m.version, file);
+  };
+  if (log.empty()) {
+    catchSignals();
+    fmt::print(stderr, "waiting for a run on {}; Ctrl-C ends\n", url);
+    if (!followBus(
+            url, [] { return stop_requested != 0; }, begin,
+            [&](const LogEvent& event) { out->add(event); }))
+      throw InputError(fmt::format("bus {}: no run, nothing is written", url));
+  } else {
+    Damage damage;
+    LogReader reader(log, &damage);
+    LogEvent event;
+    while (reader.next(event)) {
+      if (event.channel == channel::kExperiment && !out) begin(event.require<experiment_t>(log));
+      if (out) out->add(event);
+    }
+    printDamage(damage);
+    if (!out) throw InputError(fmt::format("{}: no configuration in this log", log));
+  }
+  out->finish();
+  return kDone;
+}
+
+}  // namespace
+
 int collectCommand(int argc, char** argv) {
   CLI::App cli("Takes variables out of a log, as CSV with the unit in every column's name.",
                "ves collect");
-  std::string log, out, mcap;
+  std::string log, out, mcap, url = kDefaultUrl;
+  bool follow = false;
   std::vector<std::string> select;
   bool list = false;
   double rate = 0.0, from = 0.0, duration = HUGE_VAL;
-  cli.add_option("log", log, "LCM event log of a run")->required();
+  cli.add_option("log", log, "LCM event log of a run");
   cli.add_option("--select", select,
                  "columns, or beginnings of their names: z_ fx_dynamic; all by default");
   cli.add_flag("--list", list, "only the names of the columns");
@@ -29,13 +64,14 @@ int collectCommand(int argc, char** argv) {
   cli.add_option("--duration", duration, "[s]; to the end by default")->check(inRange(0.0, 1e9));
   cli.add_option("--out", out, "file; standard output by default");
   cli.add_option("--mcap", mcap, "everything into this MCAP file for Foxglove, PlotJuggler, Rerun");
+  cli.add_flag("--follow", follow, "the run on the bus instead of a log, with --mcap");
+  cli.add_option("--url", url, "LCM bus, with --follow")->capture_default_str();
   return run(cli, argc, argv, [&] {
+    if (follow == !log.empty() || (follow && mcap.empty()))
+      throw InputError("want a log, or --follow with --mcap FILE");
+    if (!mcap.empty()) return writeMcap(log, url, mcap);
     const Series series = readSeries(log);
     printDamage(series.damage);
-    if (!mcap.empty()) {
-      writeMcap(series, log, mcap);
-      return kDone;
-    }
     std::vector<Column> chosen;
     std::vector<bool> used(select.size(), false);
     for (const Column& column : columns(series.experiment))

@@ -27,7 +27,9 @@ std::string recordedPage(const ViewOptions& options, double rate) {
   for (const std::string& log : options.logs) {
     const Series series = readSeries(log);
     printDamage(series.damage);
-    recordings.push_back(recording(series, rate));
+    std::vector<std::string> warnings;
+    recordings.push_back(recording(series, rate, warnings));
+    for (const std::string& warning : warnings) fmt::print(stderr, "warning: {}\n", warning);
   }
   return page(recordings);
 }

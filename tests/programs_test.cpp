@@ -148,6 +148,24 @@ TEST_F(Programs, LcmLoggerBesideARunReplaysToo) {
   });
 }
 
+TEST_F(Programs, AnMcapFileIsWrittenDuringARun) {
+  enterPrivateBus();
+  const std::string file = (folder_ / "live.mcap").string();
+  Process follow = start("collect", {"--follow", "--mcap", file});
+  Process run = start("run", {"z_sine", "--no-plots", "--quiet", "--set", kShortProgram, "--out",
+                              (folder_ / "run").string()});
+  EXPECT_EQ(run.wait(), 0);
+  EXPECT_EQ(follow.wait(), 0);
+  std::ifstream in(file, std::ios::binary);
+  const std::string bytes{std::istreambuf_iterator<char>(in), {}};
+  const std::string magic("\x89MCAP0\r\n", 8);
+  ASSERT_GT(bytes.size(), 10'000u);
+  EXPECT_EQ(bytes.substr(0, 8), magic);
+  EXPECT_EQ(bytes.substr(bytes.size() - 8), magic);  // it has its index
+  EXPECT_NE(bytes.find("/ves/state"), std::string::npos);
+  EXPECT_NE(bytes.find("configuration_hash"), std::string::npos);
+}
+
 TEST_F(Programs, SecondControllerRefusesToArmAndTheFirstGoesOn) {
   enterPrivateBus();
   Bus bus(kDefaultUrl);

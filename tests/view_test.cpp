@@ -7,10 +7,14 @@
 
 #include <cmath>
 #include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <map>
 #include <set>
 
 #include "support/refusal.hpp"
 #include "support/rig.hpp"
+#include "support/robots.hpp"
 #include "ves/results/marks.hpp"
 #include "ves/results/tool_motion.hpp"
 #include "ves/transport/channels.hpp"
@@ -22,6 +26,8 @@
 
 namespace ves {
 namespace {
+
+namespace fs = std::filesystem;
 
 RecordedRun puma() {
   static const RecordedRun run = recordLockstep(test::experiment(
@@ -125,6 +131,101 @@ TEST(Scene, TheArmEndsInThePlatformAndStandsAtItsRoot) {
   const float* tip = arm + 3 * (points.size() - 1);
   EXPECT_GT(x.head<3>().norm(), 1e-3);
   EXPECT_LT((Vec3(tip[0], tip[1], tip[2]) - x.head<3>()).norm(), 1e-6);
+}
+
+/// The PUMA with looks: base a box, link 2 a mesh that is no STL over a collision that is, link 3 a
+/// sphere and a cylinder, link 4 a mesh that is nowhere.
+class Looks : public testing::Test {
+ protected:
+  void SetUp() override {
+    fs::create_directories(folder_ / "arm/meshes");
+    const float corners[] = {0, 0, 0, 1, 0, 0, 0, 2, 0};  // one triangle
+    std::string stl(80, ' ');
+    const std::uint32_t count = 1;
+    stl.append(reinterpret_cast<const char*>(&count), 4).append(12, '\0');
+    stl.append(reinterpret_cast<const char*>(corners), sizeof corners).append(2, '\0');
+    write("arm/meshes/two.stl", stl);
+    write("arm/meshes/text.stl",
+          "solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 2e0 "
+          "0\nendloop\nendfacet\nendsolid x\n");
+    setenv("ROS_PACKAGE_PATH", folder_.c_str(), 1);
+    std::string text = test::readText(test::configDir() + "/robots/puma560.urdf");
+    const auto dress = [&](const std::string& link, const std::string& with) {
+      const std::string head = "<link name=\"" + link + "\">";
+      const std::size_t at = text.find(head);
+      ASSERT_NE(at, std::string::npos) << link;
+      text.insert(at + head.size(), with);
+    };
+    const std::string visual = "<visual><geometry>", end = "</geometry></visual>";
+    dress("link_0", visual + "<box size='0.1 0.2 0.3'/>" + end);
+    dress("link_2", visual + "<mesh filename='package://arm/meshes/two.dae'/>" + end +
+                        "<collision><origin xyz='0 0 0.5' rpy='0 0 1.5707963267948966'/><geometry>"
+                        "<mesh filename='package://arm/meshes/two.stl' scale='0.1 0.1 0.1'/>"
+                        "</geometry></collision>");
+    dress("link_3", visual + "<sphere radius='0.04'/>" + end + visual +
+                        "<cylinder radius='0.03' length='0.4'/>" + end);
+    dress("link_4", visual + "<mesh filename='package://arm/meshes/none.stl'/>" + end);
+    write("dressed.urdf", text);
+  }
+  void TearDown() override {
+    unsetenv("ROS_PACKAGE_PATH");
+    fs::remove_all(folder_);
+  }
+  void write(const std::string& name, const std::string& bytes) {
+    std::ofstream(folder_ / name, std::ios::binary) << bytes;
+  }
+  nlohmann::ordered_json shapes(const std::string& kind, const std::string& frame) {
+    nlohmann::ordered_json out = nlohmann::ordered_json::array();
+    const Scene drawn = scene();
+    for (const auto& shape : drawn.description()["shapes"])
+      if (shape["kind"] == kind && shape["frame"] == frame) out.push_back(shape);
+    return out;
+  }
+  Scene scene() {
+    return Scene(test::experiment("puma_on_table_4_1",
+                                  {"robot.urdf=" + (folder_ / "dressed.urdf").string()}));
+  }
+  fs::path folder_ = fs::temp_directory_path() / ("ves_looks_" + std::to_string(getpid()));
+};
+
+TEST_F(Looks, AreDrawnWhereTheDescriptionHasThem) {
+  const auto box = shapes("box", "platform");
+  ASSERT_EQ(box.size(), 1u);
+  EXPECT_EQ(box[0]["size"].dump(), "[0.1,0.2,0.3]");
+  EXPECT_NEAR(box[0]["position"][2].get<double>(), 0.0957 + 0.0127, 1e-12);  // mount.yaml
+  ASSERT_EQ(shapes("sphere", "link3").size(), 1u);
+  ASSERT_EQ(shapes("rod", "link3").size(), 1u);
+  EXPECT_EQ(shapes("rod", "link3")[0]["length"], 0.4);
+  const auto mesh = shapes("mesh", "link2");
+  ASSERT_EQ(mesh.size(), 1u);
+  EXPECT_EQ(mesh[0]["position"].dump(), "[0.0,0.0,0.5]");
+  EXPECT_NEAR(mesh[0]["quaternion"][2].get<double>(), std::sqrt(0.5), 1e-12);
+  EXPECT_EQ(mesh[0]["triangles"], base64({0, 0, 0, 0.1f, 0, 0, 0, 0.2f, 0}));
+  // What is drawn needs no line from joint to joint; what is not keeps it.
+  EXPECT_TRUE(shapes("capsule", "link2").empty());
+  EXPECT_FALSE(shapes("capsule", "link4").empty() && shapes("capsule", "link1").empty());
+  ASSERT_EQ(scene().warnings().size(), 1u);
+  EXPECT_EQ(scene().warnings()[0],
+            "package://arm/meshes/none.stl: not found, its link is drawn as a line");
+}
+
+TEST_F(Looks, AMeshThatIsNoneIsNamed) {
+  const std::string good = test::readText((folder_ / "arm/meshes/two.stl").string());
+  const std::string nan("\0\0\xc0\x7f", 4);
+  for (const auto& [bytes, why] : std::map<std::string, std::string>{
+           {"", "0 corners"},
+           {good.substr(0, 100), "0 corners"},
+           {good.substr(0, 96) + nan + good.substr(100), "a corner at [nan"},
+           {"solid\nvertex 1 2\n", "vertex 1, want three numbers"},
+           {"solid\nvertex 1 2 3\n", "1 corners, want three a triangle"}}) {
+    write("arm/meshes/two.stl", bytes);
+    const auto warnings = scene().warnings();
+    ASSERT_EQ(warnings.size(), 2u) << why;
+    EXPECT_NE(warnings[0].find("two.stl: no STL mesh: " + why), std::string::npos) << warnings[0];
+  }
+  write("arm/meshes/two.stl", test::readText((folder_ / "arm/meshes/text.stl").string()));
+  EXPECT_EQ(scene().warnings().size(), 1u);  // as text it is the same
+  EXPECT_EQ(shapes("mesh", "link2")[0]["triangles"], base64({0, 0, 0, 0.1f, 0, 0, 0, 0.2f, 0}));
 }
 
 TEST(Scene, WithoutAnArmThereIsNone) {
@@ -247,7 +348,9 @@ TEST(Page, BytesAreWrittenAsRfc4648Does) {
 
 TEST(Page, HasAPictureForEveryInstantThatCanBeSeen) {
   const RecordedRun run = puma();
-  const auto shown = recording(run.series, 50.0);
+  std::vector<std::string> warnings;
+  const auto shown = recording(run.series, 50.0, warnings);
+  EXPECT_TRUE(warnings.empty());
   const std::size_t numbers = shown["pictures"].get<std::string>().size() / 4 * 3 / 4;
   const std::size_t pictures = numbers / shown["width"].get<std::size_t>();
   EXPECT_NEAR(static_cast<double>(pictures), 0.5 * static_cast<double>(run.series.rows.size()),

@@ -6,6 +6,7 @@
 #include <urdf_parser/urdf_parser.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <mutex>
 
@@ -125,6 +126,7 @@ class UrdfTree::Impl {
       frames[link] = static_cast<int>(out.frames.size());
       out.frames.push_back(
           {link->name, parent, here.link, here.X, moves ? link->parent_joint->name : ""});
+      addVisuals(*link, frames[link], out.visuals);
       carried[link] = here;
       RigidBody& carrier = model.bodyOf(here.link);
       if (!link->inertial) {
@@ -265,6 +267,68 @@ class UrdfTree::Impl {
       return joint.ratio * heldAt(*find(joint.follows), held) + joint.offset;
     const auto given = held.find(joint.name);
     return given != held.end() ? given->second : std::clamp(0.0, joint.lower, joint.upper);
+  }
+
+  /// Nothing for a shape that has no size.
+  static std::optional<Visual> visualOf(const urdf::Geometry& geometry, const urdf::Pose& origin,
+                                        int frame) {
+    Visual out;
+    out.frame = frame;
+    out.X_frame = toTransform(origin);
+    switch (geometry.type) {
+      case urdf::Geometry::BOX: {
+        const urdf::Vector3& d = static_cast<const urdf::Box&>(geometry).dim;
+        out.kind = Visual::Kind::kBox;
+        out.size = Vec3(d.x, d.y, d.z);
+        break;
+      }
+      case urdf::Geometry::CYLINDER: {
+        const auto& c = static_cast<const urdf::Cylinder&>(geometry);
+        out.kind = Visual::Kind::kCylinder;
+        out.size = Vec3(c.radius, c.length, 0.0);
+        break;
+      }
+      case urdf::Geometry::SPHERE:
+        out.kind = Visual::Kind::kSphere;
+        out.size = Vec3(static_cast<const urdf::Sphere&>(geometry).radius, 0.0, 0.0);
+        break;
+      case urdf::Geometry::MESH: {
+        const auto& mesh = static_cast<const urdf::Mesh&>(geometry);
+        out.kind = Visual::Kind::kMesh;
+        out.size = Vec3(mesh.scale.x, mesh.scale.y, mesh.scale.z);
+        out.mesh = mesh.filename;
+        break;
+      }
+    }
+    const bool fine = out.size.allFinite() && out.size.cwiseAbs().maxCoeff() <= kMaxLength &&
+                      out.size(0) != 0.0 && out.X_frame.p.allFinite() && out.X_frame.R.allFinite();
+    return fine ? std::optional(out) : std::nullopt;
+  }
+
+  static bool isStl(const urdf::Geometry& geometry) {
+    if (geometry.type != urdf::Geometry::MESH) return false;
+    std::string name = static_cast<const urdf::Mesh&>(geometry).filename;
+    std::transform(name.begin(), name.end(), name.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    return name.size() > 4 && name.compare(name.size() - 4, 4, ".stl") == 0;
+  }
+
+  /// A link's visuals. Where one is a mesh that is no STL, its collision meshes stand for all.
+  static void addVisuals(const urdf::Link& link, int frame, std::vector<Visual>& out) {
+    const auto add = [&](const urdf::GeometrySharedPtr& geometry, const urdf::Pose& origin) {
+      if (const auto visual = visualOf(*geometry, origin, frame)) out.push_back(*visual);
+    };
+    const auto strange = [](const auto& part) {
+      return part->geometry && part->geometry->type == urdf::Geometry::MESH &&
+             !isStl(*part->geometry);
+    };
+    if (std::any_of(link.visual_array.begin(), link.visual_array.end(), strange)) {
+      for (const auto& part : link.collision_array)
+        if (part->geometry && !strange(part)) add(part->geometry, part->origin);
+      return;
+    }
+    for (const auto& part : link.visual_array)
+      if (part->geometry) add(part->geometry, part->origin);
   }
 
   RigidBody bodyOf(const urdf::Link& link, std::vector<std::string>& warnings) const {

@@ -99,6 +99,8 @@ void LiveRun::describe() {
     if (!std::exchange(warned_, true)) fmt::print(stderr, "ves view: {}\n", error.what());
     return;
   }
+  for (const std::string& warning : scene_->warnings())
+    fmt::print(stderr, "warning: {}\n", warning);
   ++edition_;
   nlohmann::ordered_json description = scene_->description();
   description["scalars"].push_back("real_time_factor");

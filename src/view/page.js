@@ -9,6 +9,8 @@
   const COLOURS = ['#0067a8', '#c14e00', '#00805e'];
   const NUMBERS = 7;  // of a frame: position, quaternion
 
+  const floats = base64 => new Float32Array(Uint8Array.from(atob(base64), c => c.charCodeAt(0)).buffer);
+
   /** Pictures of one run, in the order of time. */
   class Recording {
     constructor(scene, width, pictures) {
@@ -20,8 +22,7 @@
       this.scalarAt = new Map(scene.scalars.map((name, k) => [name, this.armAt + 3 * scene.arm.length + k]));
     }
     static of(data) {
-      const bytes = Uint8Array.from(atob(data.pictures), c => c.charCodeAt(0));
-      const numbers = new Float32Array(bytes.buffer), pictures = [];
+      const numbers = floats(data.pictures), pictures = [];
       for (let i = 0; i < numbers.length; i += data.width) pictures.push(numbers.subarray(i, i + data.width));
       return new Recording(data.scene, data.width, pictures);
     }
@@ -131,7 +132,7 @@
 
   function body(shape, look) {
     const material = new THREE.MeshStandardMaterial({
-      color: look.colour || {plate: 0x6b7885, cylinder: 0x8d99a6, capsule: 0xe0903a, axes: 0x333333}[shape.kind],
+      color: look.colour || {plate: 0x6b7885, cylinder: 0x8d99a6, capsule: 0xe0903a, rod: 0xe0903a, sphere: 0xe0903a, box: 0xe0903a, mesh: 0xe0903a, axes: 0x333333}[shape.kind],
       transparent: look.opacity < 1, opacity: look.opacity || 1, roughness: 0.6, metalness: 0.1,
       depthWrite: !(look.opacity < 1)});
     const group = new THREE.Group();
@@ -159,9 +160,25 @@
       });
       for (const end of [a, b])
         add(new THREE.SphereBufferGeometry(shape.radius * 1.15, 18, 14), mesh => mesh.position.copy(end));
+    } else if (shape.kind === 'rod') {
+      add(new THREE.CylinderBufferGeometry(shape.radius, shape.radius, shape.length, 24), mesh => {
+        mesh.rotation.x = Math.PI / 2;
+      });
+    } else if (shape.kind === 'sphere') {
+      add(new THREE.SphereBufferGeometry(shape.radius, 24, 18));
+    } else if (shape.kind === 'box') {
+      add(new THREE.BoxBufferGeometry(...shape.size));
+    } else if (shape.kind === 'mesh') {
+      const geometry = new THREE.BufferGeometry();
+      geometry.setAttribute('position', new THREE.BufferAttribute(floats(shape.triangles), 3));
+      geometry.computeVertexNormals();
+      material.side = THREE.DoubleSide;
+      add(geometry);
     } else if (shape.kind === 'axes') {
       group.add(new THREE.AxesHelper(shape.size));
     }
+    if (shape.position) group.position.set(...shape.position);
+    if (shape.quaternion) group.quaternion.set(...shape.quaternion);
     group.material = material;
     return group;
   }

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cctype>
 #include <map>
-#include <set>
 
 #include "cdr.hpp"
 #include "ves/transport/channels.hpp"
@@ -63,38 +62,38 @@ std::string camel(const std::string& type) {
   return out;
 }
 
+}  // namespace
+
 // --- The run -------------------------------------------------------------------------------------
 
-class Run {
+class McapExport::Impl {
  public:
-  Run(const Series& series, const std::string& log, const std::string& file)
-      : series_(series),
-        experiment_(series.experiment),
-        log_(log),
-        out_(file, "ros2", "ves " + series.version),
-        emulated_(emulation(series)) {
-    if (emulated_) base_ = basePoses(series, *emulated_);
+  Impl(const Experiment& experiment, const std::string& version, const std::string& file)
+      : experiment_(experiment), version_(version), out_(file, "ros2", "ves " + version) {
+    open();
   }
 
-  void write() {
-    open();
-    for (const Row& row : series_.rows) rows_[row.state.header.sequence] = &row;
-    Damage damage;  // told when the series was read
-    LogReader reader(log_, &damage);
-    LogEvent event;
-    bool first = true;
-    while (reader.next(event)) {
-      const std::int64_t now = event.time_us * 1000;
-      if (std::exchange(first, false)) begin(now);
-      message(event, now);
-      if (event.channel != channel::kState) continue;
-      const auto state = event.as<state_t>();
-      const auto row = state ? rows_.find(state->header.sequence) : rows_.end();
-      if (row != rows_.end() && seen_.insert(row->first).second) tick(*row->second, now);
+  void add(const LogEvent& event) {
+    const std::int64_t now = event.time_us * 1000;
+    if (std::exchange(first_, false)) begin(now);
+    message(event, now);
+    if (event.channel != channel::kState) {
+      if (const auto m = event.as<truth_t>()) rows_.add(*m);
+      if (const auto m = event.as<sample_t>()) rows_.add(*m);
+      return;
     }
+    const auto state = event.as<state_t>();
+    if (!state || !ours(*state)) return;
+    followBase(*state);
+    // Its truth and its sample came before it: the row of the one before is not needed.
+    rows_.add(*state);
+    tick(*rows_.finish(), now);
+  }
+
+  void finish() {
     out_.attach(experiment_.name + ".yaml", "application/yaml", experiment_.resolved);
     out_.describe("ves", {{"configuration_hash", experiment_.hash},
-                          {"version", series_.version},
+                          {"version", version_},
                           {"scenario", experiment_.name}});
     out_.finish();
   }
@@ -144,6 +143,30 @@ class Run {
       const std::uint16_t to = channel(topic, "ves_msgs/msg/" + camel(type), definition.ros2());
       own_.emplace(name, std::pair(to, definition));
     }
+  }
+
+  /// Of the first controller, and no tick twice.
+  bool ours(const state_t& state) {
+    const Identity from{state.header.source, state.header.epoch};
+    if (tick_ < 0) controller_ = from;
+    if (from.source != controller_.source || from.epoch != controller_.epoch ||
+        state.header.sequence <= tick_)
+      return false;
+    tick_ = state.header.sequence;
+    return true;
+  }
+
+  /// The base in free space, from where the platform is let go in the first admittance segment.
+  void followBase(const state_t& state) {
+    const bool begins = base_start_ < 0 && state.phase == static_cast<int>(Phase::kRunning) &&
+                        state.kind == static_cast<int>(SegmentKind::kAdmittance);
+    if (begins) {
+      base_start_ = state.header.sequence;
+      base_segment_ = state.segment;
+      base_ = baseMotion(experiment_, Vec6::Map(state.x_desired), references_);
+    }
+    if (state.segment != base_segment_ || state.phase != static_cast<int>(Phase::kRunning))
+      base_.reset();
   }
 
   void message(const LogEvent& event, std::int64_t now) {
@@ -201,8 +224,9 @@ class Run {
     const JointVector q = JointVector::Map(row.has_truth ? row.truth.q : row.sample.q);
     std::vector<Stamped> moving = {{"inertial", "platform", X_IP}};
     robotFrames(q, true, "", moving);
-    if (const auto base = base_.find(row.state.header.sequence); base != base_.end()) {
-      moving.push_back({"inertial", "ghost/platform", geometry.fromHome(Pose::from(base->second))});
+    if (const auto base =
+            base_ ? base_->at(row.state.header.sequence - base_start_) : std::nullopt) {
+      moving.push_back({"inertial", "ghost/platform", geometry.fromHome(Pose::from(*base))});
       robotFrames(q, true, "ghost/", moving);
     }
     transforms(tf_, now, moving);
@@ -274,24 +298,28 @@ class Run {
                    .bytes());
   }
 
-  const Series& series_;
-  const Experiment& experiment_;
-  const std::string log_;
+  const Experiment experiment_;
+  const std::string version_;
   McapWriter out_;
-  std::optional<Emulation> emulated_;
-  std::map<std::int64_t, Vec6> base_;
-  std::map<std::int64_t, const Row*> rows_;
-  std::set<std::int64_t> seen_;
+  bool first_ = true;
+  RowMaker rows_;
+  Identity controller_;     // whose run it is
+  std::int64_t tick_ = -1;  // the last
+  ReferenceMotions references_;
+  std::optional<BaseMotion> base_;
+  std::int64_t base_start_ = -1;  // tick
+  int base_segment_ = -1;
   std::map<std::string, std::pair<std::uint16_t, LcmDefinition>> own_;  // by LCM channel
   std::uint16_t tf_ = 0, tf_static_ = 0, description_ = 0, joints_ = 0, wrench_ = 0, legs_ = 0,
                 words_ = 0;
   std::string said_;
 };
 
-}  // namespace
-
-void writeMcap(const Series& series, const std::string& log, const std::string& file) {
-  Run(series, log, file).write();
-}
+McapExport::McapExport(const Experiment& experiment, const std::string& version,
+                       const std::string& file)
+    : impl_(std::make_unique<Impl>(experiment, version, file)) {}
+McapExport::~McapExport() = default;
+void McapExport::add(const LogEvent& event) { impl_->add(event); }
+void McapExport::finish() { impl_->finish(); }
 
 }  // namespace ves

@@ -7,7 +7,9 @@
 #include <cmath>
 #include <map>
 
+#include "stl.hpp"
 #include "ves/base/coordinates.hpp"
+#include "ves/base/errors.hpp"
 #include "ves/control/safety_checks.hpp"
 #include "ves/math/dense.hpp"
 #include "ves/view/page.hpp"
@@ -84,7 +86,7 @@ Scene::Scene(const Experiment& e)
                     {"frame", "platform"},
                     {"radius", 0.08},
                     {"length", payload_.X_PS.p.z()}});
-  if (!e.robot.frames.empty()) addRobot();
+  if (!e.robot.frames.empty()) addRobot(e.robot);
   addArm();
 
   const auto addPose = [&](const char* what, const double(state_t::*field)[6]) {
@@ -144,8 +146,8 @@ void Scene::addFrame(const std::string& name, const std::string& parent) {
   description_["frames"].push_back({{"name", name}, {"parent", parent}});
 }
 
-/// Capsules from joint to joint, and to the tool.
-void Scene::addRobot() {
+/// What its description shows; of links without, capsules from joint to joint and to the tool.
+void Scene::addRobot(const UrdfRobot& description) {
   const RobotModel& robot = payload_.robot;
   Json& shapes = description_["shapes"];
   const Transform X_PL0 = payload_.X_PL0();
@@ -155,10 +157,11 @@ void Scene::addRobot() {
                     {"length", X_PL0.p.z() - payload_.X_PR.p.z()},
                     {"radius", 0.2}});
   for (int i = 0; i < robot.size; ++i) addFrame(linkFrame(i), "platform");
+  const std::set<int> seen = addVisuals(description);
   for (int i = 0; i < robot.size; ++i) {
     const Link& link = robot.link(i);
     const Vec3 joint = link.X_parent.p;
-    if (!(joint.norm() > kShortestLink)) continue;
+    if (!(joint.norm() > kShortestLink) || seen.count(link.parent)) continue;
     if (link.parent < 0)
       shapes.push_back(capsule("platform", X_PL0.p, X_PL0 * joint));
     else
@@ -169,9 +172,62 @@ void Scene::addRobot() {
   description_["reach"] = reach;
   if (!tool_) return;
   addFrame("tool", "platform");
-  if (tool_->link >= 0 && tool_->X_link.p.norm() > kShortestLink)
+  if (tool_->link >= 0 && !seen.count(tool_->link) && tool_->X_link.p.norm() > kShortestLink)
     shapes.push_back(capsule(linkFrame(tool_->link), Vec3::Zero(), tool_->X_link.p));
   shapes.push_back({{"kind", "axes"}, {"frame", "tool"}, {"size", 0.15}});
+}
+
+/// Returns the links that are drawn: -1 is link 0.
+std::set<int> Scene::addVisuals(const UrdfRobot& description) {
+  std::set<int> seen;
+  for (const Visual& visual : description.visuals) {
+    const NamedFrame& frame = description.frames[static_cast<std::size_t>(visual.frame)];
+    const Transform X =
+        (frame.link < 0 ? payload_.X_PL0() : Transform()) * frame.X_link * visual.X_frame;
+    const Eigen::Quaterniond q(X.R);
+    Json shape = {{"kind", ""},
+                  {"frame", frame.link < 0 ? "platform" : linkFrame(frame.link)},
+                  {"position", json(X.p)},
+                  {"quaternion", {q.x(), q.y(), q.z(), q.w()}}};
+    switch (visual.kind) {
+      case Visual::Kind::kBox:
+        shape["kind"] = "box";
+        shape["size"] = json(visual.size);
+        break;
+      case Visual::Kind::kCylinder:
+        shape["kind"] = "rod";
+        shape["radius"] = visual.size(0);
+        shape["length"] = visual.size(1);
+        break;
+      case Visual::Kind::kSphere:
+        shape["kind"] = "sphere";
+        shape["radius"] = visual.size(0);
+        break;
+      case Visual::Kind::kMesh: {
+        const std::filesystem::path file = findMesh(visual.mesh);
+        if (file.empty()) {
+          warnings_.push_back(
+              fmt::format("{}: not found, its link is drawn as a line", visual.mesh));
+          continue;
+        }
+        std::vector<float> corners;
+        try {
+          for (const Vec3& p : readStl(file))
+            for (const double x :
+                 {p.x() * visual.size(0), p.y() * visual.size(1), p.z() * visual.size(2)})
+              corners.push_back(static_cast<float>(x));
+        } catch (const InputError& error) {
+          warnings_.push_back(error.what());
+          continue;
+        }
+        shape["kind"] = "mesh";
+        shape["triangles"] = base64(corners);
+      }
+    }
+    description_["shapes"].push_back(shape);
+    seen.insert(frame.link);
+  }
+  return seen;
 }
 
 void Scene::addArm() {
@@ -223,8 +279,10 @@ std::vector<float> Scene::picture(const Row& row, const std::optional<Vec6>& bas
   return out;
 }
 
-nlohmann::ordered_json recording(const Series& series, double rate) {
+nlohmann::ordered_json recording(const Series& series, double rate,
+                                 std::vector<std::string>& warnings) {
   const Scene scene(series.experiment);
+  warnings.insert(warnings.end(), scene.warnings().begin(), scene.warnings().end());
   const std::optional<Emulation> emulated = emulation(series);
   const auto base = emulated ? basePoses(series, *emulated) : std::map<std::int64_t, Vec6>();
   std::vector<float> numbers;

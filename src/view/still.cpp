@@ -106,6 +106,25 @@ std::string still(const Scene& scene, const std::vector<float>& picture, StillVi
       const Vec3 from = shape.contains("from") ? point(shape["from"]) : Vec3(Vec3::Zero());
       drawing.stroke(X * from, X * Vec3(from + Vec3(0.0, 0.0, number(shape["length"]))),
                      2.0 * number(shape["radius"]), kMetal, false);
+    } else if (kind == "rod" || kind == "sphere" || kind == "box") {  // meshes are too fine
+      const Json& q = shape["quaternion"];
+      const Transform here =
+          X * Transform{Eigen::Quaterniond(number(q[3]), number(q[0]), number(q[1]), number(q[2]))
+                            .toRotationMatrix(),
+                        point(shape["position"])};
+      Vec3 half(0.0, 0.0, 0.0);
+      double width = 0.0;
+      if (kind == "box") {
+        const Vec3 size = point(shape["size"]);
+        Eigen::Index longest = 0;
+        size.maxCoeff(&longest);
+        half(longest) = 0.5 * size(longest);
+        width = std::sqrt(size.prod() / size(longest));
+      } else {
+        if (kind == "rod") half.z() = 0.5 * number(shape["length"]);
+        width = 2.0 * number(shape["radius"]);
+      }
+      drawing.stroke(here * Vec3(-half), here * half, width, kRobot, kind == "sphere");
     } else if (kind == "capsule") {
       drawing.stroke(X * point(shape["from"]), X * point(shape["to"]),
                      2.0 * number(shape["radius"]), kRobot, true);

@@ -27,11 +27,22 @@ struct NamedFrame {
   Transform pose(const LinkPoses& X_L0L) const { return link < 0 ? X_link : X_L0L[link] * X_link; }
 };
 
+/// What a link looks like.
+struct Visual {
+  enum class Kind { kBox, kCylinder, kSphere, kMesh };
+  Kind kind = Kind::kBox;
+  int frame = 0;             // [-] of the link, of `frames`
+  Transform X_frame;         // its pose there
+  Vec3 size = Vec3::Ones();  // [m] of a box; {radius, length along z, 0}; {radius, 0, 0}; [-] scale
+  std::string mesh;          // file, as the description names it
+};
+
 struct UrdfRobot {
   RobotModel model;
   std::vector<std::string> joint_names;  // of the joint values
   JointVector fastest;                   // [rad/s | m/s] of each; infinite where it is not said
   std::vector<NamedFrame> frames;        // every link, base first
+  std::vector<Visual> visuals;           // what there is of them; of no use but to be looked at
   std::vector<std::string> held;         // "joint 'finger' at 0.01 m": could move, and does not
   std::vector<std::string> warnings;     // what no rigid body can have, accepted all the same
   std::string choice;  // what moves, where nobody has said it and it is no serial arm

@@ -7,6 +7,7 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,8 @@ class Scene {
   /// "shapes" (kind, frame, sizes [m]), "arm" (the line of the arm at rest, in I [m]), "scalars"
   /// (names), "phases", "segments", "checks".
   const nlohmann::ordered_json& description() const { return description_; }
+  /// Meshes that are not drawn, and why.
+  const std::vector<std::string>& warnings() const { return warnings_; }
 
   /// One instant, as many numbers as width(): seven a frame {p [m], quaternion x y z w} in its
   /// parent, three [m] for each point of the arm, by which it is bent, then the scalars. NaN where
@@ -34,7 +37,8 @@ class Scene {
 
  private:
   void addFrame(const std::string& name, const std::string& parent);
-  void addRobot();
+  void addRobot(const UrdfRobot& robot);
+  std::set<int> addVisuals(const UrdfRobot& robot);
   void addArm();
 
   struct Scalar {
@@ -49,9 +53,12 @@ class Scene {
   std::vector<std::string> frames_;
   std::vector<Scalar> scalars_;
   nlohmann::ordered_json description_;
+  std::vector<std::string> warnings_;
 };
 
-/// A recorded run for a page: its scene, and pictures at most `rate` [1/s] times a second.
-nlohmann::ordered_json recording(const Series& series, double rate);
+/// A recorded run for a page: its scene, and pictures at most `rate` [1/s] times a second. What is
+/// not drawn is added to `warnings`.
+nlohmann::ordered_json recording(const Series& series, double rate,
+                                 std::vector<std::string>& warnings);
 
 }  // namespace ves
