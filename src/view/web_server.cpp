@@ -4,6 +4,7 @@
 #include <arpa/inet.h>
 #include <fmt/format.h>
 #include <libwebsockets.h>
+#include <netinet/tcp.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -21,7 +22,8 @@
 namespace ves {
 namespace {
 
-constexpr std::size_t kChunk = 16384;  // [B]
+constexpr std::size_t kChunk = 16384;      // [B]
+constexpr std::size_t kPacket = 1u << 20;  // [B] written at once; by default as little as is read
 
 std::string newToken() {
   std::random_device random;
@@ -94,8 +96,8 @@ class WebServer::Impl {
   Impl(Listener listener, std::string page, LiveSource* live)
       : listener_(std::move(listener)), page_(std::move(page)), live_(live) {
     lws_set_log_level(0, nullptr);
-    protocols_ = {lws_protocols{"http", &Impl::onHttp, sizeof(Download), 0, 0, nullptr, 0},
-                  lws_protocols{"ves", &Impl::onPage, 0, kLongestMessage, 0, nullptr, 0},
+    protocols_ = {lws_protocols{"http", &Impl::onHttp, sizeof(Download), 0, 0, nullptr, kPacket},
+                  lws_protocols{"ves", &Impl::onPage, 0, kLongestMessage, 0, nullptr, kPacket},
                   lws_protocols{"file", &Impl::onFile, 0, 0, 0, nullptr, 0},
                   lws_protocols{nullptr, nullptr, 0, 0, 0, nullptr, 0}};
     lws_context_creation_info info{};
@@ -166,6 +168,8 @@ class WebServer::Impl {
     for (;;) {
       const int fd = accept4(listener_.descriptor, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
       if (fd < 0) return;
+      const int yes = 1;
+      setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);  // a picture is worth a packet
       adopt(fd);
     }
   }
