@@ -15,6 +15,7 @@
 #include <cstring>
 #include <map>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "ves/base/errors.hpp"
@@ -160,6 +161,7 @@ class WebServer::Impl {
     std::int64_t picture = 0;  // the last that it got
     lws_usec_t second = 0;     // [us] in which its messages are counted
     int messages = 0;
+    std::string message;  // as far as it has come
   };
 
   static Impl& of(lws* wsi) { return *static_cast<Impl*>(lws_context_user(lws_get_context(wsi))); }
@@ -310,14 +312,18 @@ class WebServer::Impl {
     return 0;
   }
 
-  int receive(lws* wsi, std::string_view text) {
+  /// A message may come in pieces, wherever the network or its sender cuts it.
+  int receive(lws* wsi, std::string_view piece) {
     Page& page = pages_[wsi];
+    page.message += piece;
+    const bool whole = lws_is_final_fragment(wsi) && lws_remaining_packet_payload(wsi) == 0;
+    if (!whole && page.message.size() <= kLongestMessage) return 0;
+    const std::string text = std::exchange(page.message, {});
     const lws_usec_t now = lws_now_usecs();
     if (now - page.second > LWS_US_PER_SEC) {
       page.second = now;
       page.messages = 0;
     }
-    const bool whole = lws_is_first_fragment(wsi) && lws_is_final_fragment(wsi);
     const auto message = whole && !lws_frame_is_binary(wsi) ? parsePageMessage(text) : std::nullopt;
     if (!message || ++page.messages > kMostMessages) {
       ++refusals_.malformed;

@@ -161,7 +161,7 @@ class Live(support.Page):
                 "no word": [(b"hello", 1)], "a number too large": [(b"stop 99999999999999999999", 1)],
                 "binary": [(b"drawn", 2)], "long": [(b"drawn" * 1000, 1)], "empty": [(b"", 1)],
                 "another opcode": [(b"drawn", 5)], "no text": [(b"\xff\xfe", 1)],
-                "a flood": [(b"drawn", 1)] * 1000, "pieces": [(b"dra", 1, False), (b"wn", 0)]}.items():
+                "a flood": [(b"drawn", 1)] * 1000, "pieces without an end": [(b"drawn", 1, False)] + [(b"drawn", 0, False)] * 50}.items():
             with self.subTest(what):
                 page = self.socket(run.url)
                 self.assertEqual(page.status, 101)
@@ -181,6 +181,12 @@ class Live(support.Page):
                     self.assertTrue(answer == b"" or re.match(rb"HTTP/1.. 4", answer), answer)
                 except OSError:
                     pass
+        with self.subTest("a message in pieces"):
+            page = self.socket(run.url)
+            self.assertEqual([page.read()[0] for _ in range(2)], [1, 2])  # the scene, a picture
+            for byte in support.frame(b"dra", 1, False) + support.frame(b"wn", 0):
+                page.socket.sendall(bytes([byte]))
+            self.assertEqual(page.read()[0], 2)  # it was understood: the next
         with self.subTest("a stop for another controller"):
             page = self.socket(run.url)
             page.send(b"stop 7")

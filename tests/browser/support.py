@@ -140,6 +140,15 @@ class Page(unittest.TestCase):
         cls.browser.save_screenshot(str(options.shots / (name + ".png")))
 
 
+def frame(payload, opcode=1, final=True):
+    """Of a client: masked."""
+    n, mask = len(payload), os.urandom(4)
+    head = bytes([(0x80 if final else 0) | opcode])
+    head += (bytes([0x80 | n]) if n < 126 else bytes([0x80 | 126]) + struct.pack(">H", n)
+             if n < 65536 else bytes([0x80 | 127]) + struct.pack(">Q", n))
+    return head + mask + bytes(b ^ mask[i % 4] for i, b in enumerate(payload))
+
+
 class WebSocket:
     """RFC 6455, as much as a test needs; `status` of the answer to the handshake."""
 
@@ -147,6 +156,7 @@ class WebSocket:
         place, _, query = url.removeprefix("http://").partition("/")
         address, _, port = place.partition(":")
         self.socket = socket.create_connection((address, int(port)), timeout=20)
+        self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         lines = [f"GET /{query} HTTP/1.1", f"Host: {host or place}", "Upgrade: websocket",
                  "Connection: Upgrade", "Sec-WebSocket-Version: 13",
                  "Sec-WebSocket-Key: " + base64.b64encode(os.urandom(16)).decode()]
@@ -189,12 +199,7 @@ class WebSocket:
         return first & 15, payload
 
     def send(self, payload, opcode=1, final=True):
-        head = bytes([(0x80 if final else 0) | opcode])
-        n = len(payload)
-        head += (bytes([0x80 | n]) if n < 126 else bytes([0x80 | 126]) + struct.pack(">H", n)
-                 if n < 65536 else bytes([0x80 | 127]) + struct.pack(">Q", n))
-        mask = os.urandom(4)
-        self.socket.sendall(head + mask + bytes(b ^ mask[i % 4] for i, b in enumerate(payload)))
+        self.socket.sendall(frame(payload, opcode, final))
 
     def closed(self):
         """Waits until the other side has closed; false when it goes on talking, or is silent for 5 s."""
