@@ -256,6 +256,47 @@ TEST_F(ClosedLoop, AProgramThatEndsEarlySaysWhy) {
   EXPECT_EQ(summarise(stopped, result_)["ended_early"], "a stop was requested at 4.01 s");
 }
 
+TEST_F(ClosedLoop, TheSetupIsAllThatADriverNeeds) {
+  // Counts, lengths and wrenches of a run, once more with nothing but the message.
+  const Experiment e = experiment("puma_on_table_4_1");
+  const setup_t setup = setupOf(e, true, header({1, 1}, 0, 0));
+  const Series series = run(e);
+  EXPECT_EQ(setup.period_ns, 10'000'000);
+  EXPECT_EQ(setup.lockstep, 1);
+  EXPECT_EQ(setup.joints, 6);
+  const Eigen::Map<const Eigen::Matrix<double, 6, 6, Eigen::RowMajor>> per_count(
+      setup.wrench_per_count);
+  Vec6 bias = Vec6::Zero();  // a new one counts from the next tick
+  for (const Row& row : series.rows) {
+    Vec6 adc;
+    for (int i = 0; i < 6; ++i) {
+      EXPECT_NEAR(setup.leg_offset[i] + setup.leg_scale[i] * row.sample.legs[i],
+                  row.state.leg_measured[i], 1e-12);
+      EXPECT_GE(row.state.counts[i], setup.leg_min[i]);
+      EXPECT_LE(row.state.counts[i], setup.leg_max[i]);
+      adc(i) = row.sample.adc[i] - bias(i);
+    }
+    bias = Vec6::Map(row.state.bias);
+    EXPECT_GE(row.sample.adc[6], setup.pressure_min);
+    EXPECT_LE(row.sample.adc[6], setup.pressure_max);
+    for (int i = 0; i < setup.joints; ++i) {
+      EXPECT_GE(row.sample.q[i], setup.joint_min[i]);
+      EXPECT_LE(row.sample.q[i], setup.joint_max[i]);
+    }
+    // Level, the forces of {S} are those of {I} turned by 180 degrees about x.
+    if (Vec6::Map(row.state.x_measured).tail<3>().norm() > 1e-4) continue;
+    const Vec6 W_S = per_count * adc;
+    EXPECT_NEAR(W_S(0), row.state.total[0], 0.2);
+    EXPECT_NEAR(W_S(1), -row.state.total[1], 0.2);
+    EXPECT_NEAR(W_S(2), -row.state.total[2], 0.2);
+  }
+  const state_t& parked = series.rows.back().state;
+  ASSERT_EQ(parked.phase, static_cast<int>(Phase::kParked));
+  for (int i = 0; i < 6; ++i) EXPECT_NEAR(parked.counts[i], setup.leg_home[i], 1);
+  EXPECT_EQ(setup.park_after_ns, 10'000'000'000);
+  EXPECT_EQ(setup.park_time_ns, 20'000'000'000);
+}
+
 TEST_F(ClosedLoop, TheToolIsWhereThePlatformCarriesIt) {
   // The arm's two lowest modes do not express where the platform stands: all of that is kept.
   const Series series = run(experiment(

@@ -229,8 +229,18 @@ TEST_F(PrivateBus, WhoComesLateHearsTheConfiguration) {
   experiment.header = header({7, 8}, 0, 0);
   experiment.schema = kSchema;
   experiment.resolved = "name: x";
-  Announcer announcer(kDefaultUrl, experiment);
-  while (heard < 3 && late.wait(5000)) {
+  setup_t setup{};
+  setup.arming_samples = 77;
+  std::int64_t setups = 0;
+  late.subscribe(channel::kSetup, [&](const std::string&, const void* data, std::uint32_t size) {
+    const auto m = decode<setup_t>(data, size);
+    ASSERT_TRUE(m);
+    EXPECT_EQ(m->arming_samples, 77);
+    EXPECT_EQ(m->header.source, 7);
+    ++setups;
+  });
+  Announcer announcer(kDefaultUrl, experiment, setup);
+  while (setups < 3 && late.wait(5000)) {
   }
   EXPECT_EQ(heard, 3);
   announcer.tell(Phase::kRunning);  // one may be under way
@@ -247,6 +257,7 @@ TEST_F(PrivateBus, WhoComesLateHearsTheConfiguration) {
   }
   EXPECT_GT(heard, before);
   EXPECT_LE(heard, before + 2);  // however often it is asked
+  EXPECT_EQ(setups, heard);
 }
 
 TEST_F(PrivateBus, OneControllerHasTheLegs) {

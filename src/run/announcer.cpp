@@ -8,8 +8,8 @@
 
 namespace ves {
 
-Announcer::Announcer(const std::string& url, const experiment_t& experiment)
-    : bus_(url), experiment_(experiment) {
+Announcer::Announcer(const std::string& url, const experiment_t& experiment, const setup_t& setup)
+    : bus_(url), experiment_(experiment), setup_(setup) {
   bus_.subscribe(channel::kQuery, [this](const std::string&, const void* data, std::uint32_t size) {
     asked_ = asked_ || decode<query_t>(data, size).has_value();
   });
@@ -32,7 +32,9 @@ void Announcer::announce() {
     told = monotonicNow();
     experiment_.header.time_ns = told;
     ++experiment_.header.sequence;
+    setup_.header = experiment_.header;
     bus_.publish(channel::kExperiment, experiment_);
+    bus_.publish(channel::kSetup, setup_);
   }
 }
 

@@ -57,7 +57,8 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
                     log->write(from, data, size, link.sampleTime());
                   });
   }
-  Announcer announcer(options.url, describe(experiment, self, 0));
+  Announcer announcer(options.url, describe(experiment, self, 0),
+                      setupOf(experiment, options.lockstep, header(self, 0, 0)));
 
   TickInput in;
   if (options.start) in.order.request = Request::kStart;

@@ -207,6 +207,37 @@ robot_command_t toMessage(const RobotOrder& order, const header_t& header) noexc
   return m;
 }
 
+setup_t setupOf(const Experiment& e, bool lockstep, const header_t& header) {
+  const ControllerConfig& c = e.controller;
+  setup_t m{};
+  m.header = header;
+  m.period_ns = c.period;
+  m.lockstep = lockstep ? 1 : 0;
+  m.arming_samples = c.arming_samples;
+  m.stale_ticks = c.safety.stale_ticks;
+  put(c.legs.offset, m.leg_offset);
+  put(c.legs.scale, m.leg_scale);
+  const auto counts = [&](const Vec6& L, std::int32_t(&to)[6]) {
+    const LegCounts n = legCounts(c.legs, L);
+    std::copy(n.begin(), n.end(), to);
+  };
+  counts(Vec6::Constant(c.safety.leg_min), m.leg_min);
+  counts(Vec6::Constant(c.safety.leg_max), m.leg_max);
+  counts(legLengths(c.geometry, c.geometry.fromHome(Pose())), m.leg_home);
+  m.leg_velocity = c.safety.leg_velocity;
+  Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(m.wrench_per_count) = c.sensor.C_proc;
+  m.pressure_min = c.safety.pressure_min;
+  m.pressure_max = c.safety.pressure_max;
+  m.joints = c.payload.robot.joints;
+  for (int i = 0; i < m.joints; ++i) {
+    m.joint_min[i] = c.payload.robot.jointLink(i).lower;
+    m.joint_max[i] = c.payload.robot.jointLink(i).upper;
+  }
+  m.park_after_ns = e.plant.watchdog.park_after;
+  m.park_time_ns = e.plant.watchdog.park_time;
+  return m;
+}
+
 template <>
 std::optional<experiment_t> decode<experiment_t>(const void* data, std::int64_t size) {
   constexpr std::int64_t kFixed = 8 + 32 + 4;  // [B] fingerprint, header_t, schema
@@ -361,6 +392,7 @@ bool wellFormed(const std::string& channel, const void* data, std::int64_t size)
   if (channel == channel::kTruth) return decode<truth_t>(data, size).has_value();
   if (channel == channel::kTiming) return decode<timing_t>(data, size).has_value();
   if (channel == channel::kRobot) return decode<robot_command_t>(data, size).has_value();
+  if (channel == channel::kSetup) return decode<setup_t>(data, size).has_value();
   if (channel == channel::kQuery) return decode<query_t>(data, size).has_value();
   if (channel == channel::kOperator) return decode<operator_t>(data, size).has_value();
   return false;

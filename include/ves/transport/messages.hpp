@@ -12,10 +12,12 @@
 #include <ves/query_t.hpp>
 #include <ves/robot_command_t.hpp>
 #include <ves/sample_t.hpp>
+#include <ves/setup_t.hpp>
 #include <ves/state_t.hpp>
 #include <ves/timing_t.hpp>
 #include <ves/truth_t.hpp>
 
+#include "ves/config/experiment.hpp"
 #include "ves/control/test_platform.hpp"
 #include "ves/planning/robot_order.hpp"
 #include "ves/plant/plant.hpp"
@@ -44,6 +46,8 @@ truth_t toMessage(const plant::Truth& truth, const header_t& header) noexcept;
 operator_t toMessage(const Order& order, std::int64_t controller, const header_t& header) noexcept;
 
 robot_command_t toMessage(const RobotOrder& order, const header_t& header) noexcept;
+
+setup_t setupOf(const Experiment& experiment, bool lockstep, const header_t& header);
 
 /// "panic button, floor mat"; empty when none tripped.
 std::string names(Tripped tripped);
