@@ -215,7 +215,7 @@ TEST_F(Looks, AMeshThatIsNoneIsNamed) {
   for (const auto& [bytes, why] : std::map<std::string, std::string>{
            {"", "0 corners"},
            {good.substr(0, 100), "0 corners"},
-           {good.substr(0, 96) + nan + good.substr(100), "a corner at [nan"},
+           {good.substr(0, 100) + nan + good.substr(104), "a corner at [0, nan"},
            {"solid\nvertex 1 2\n", "vertex 1, want three numbers"},
            {"solid\nvertex 1 2 3\n", "1 corners, want three a triangle"}}) {
     write("arm/meshes/two.stl", bytes);
@@ -384,7 +384,9 @@ class Live : public testing::Test {
     state_t state{};
     state.header = header({source, epoch}, number, 0);
     state.phase = static_cast<int>(engaged ? Phase::kRunning : Phase::kDisarmed);
-    state.segment = -1;
+    state.segment = segment;
+    state.kind = static_cast<int>(kind);
+    state.x_desired[0] = 0.1;
     state.cause = static_cast<int>(Check::kCount);
     state.engaged = engaged;
     state.order_source = last.header.source;
@@ -424,6 +426,8 @@ class Live : public testing::Test {
   Bus controllers{kDefaultUrl};
   LiveRun live{kDefaultUrl};
   std::int64_t queries = 0, stops = 0, tick = 700;
+  int segment = -1;
+  SegmentKind kind = SegmentKind::kMove;
   std::set<std::pair<std::int64_t, std::int64_t>> orders;
   operator_t last{};
   bool answers = true;
@@ -436,11 +440,44 @@ TEST_F(Live, WhoJoinsLateAsksForTheConfigurationAndHasTheSameTime) {
   describe(8, 100);  // somebody else's
   until(9, 100, true, [&] { return queries > 1; });
   EXPECT_EQ(live.edition(), 0);
+  experiment_t bad = ves::describe(test::experiment("free_decay"), {9, 100}, 0);
+  bad.resolved = "name: [";
+  controllers.publish(channel::kExperiment, bad);
+  until(9, 100, true, [&] { return queries > 3; });  // it asks on
+  EXPECT_EQ(live.edition(), 0);
   describe(9, 100);
   until(9, 100, true, [&] { return live.newest() > 3; });
   EXPECT_EQ(live.edition(), 1);
   EXPECT_NEAR(scalar("t_s"), 0.01 * static_cast<double>(tick), 0.05);
   EXPECT_GT(scalar("t_s"), 6.9);
+}
+
+TEST_F(Live, TheBaseIsShownToWhoSawItLetGo) {
+  const int admittance = admittanceSegment(test::experiment("free_decay").controller.program);
+  const auto base = [&] {  // the second frame
+    float x = NAN;
+    std::memcpy(&x, live.picture().data() + 24 + 4 * 7, sizeof x);
+    return x;
+  };
+  describe(9, 100);
+  segment = admittance;
+  kind = SegmentKind::kAdmittance;
+  until(9, 100, true, [&] { return live.newest() > 30; });
+  EXPECT_TRUE(std::isnan(base()));  // it joined in the middle of it
+  describe(10, 200);
+  segment = 0;
+  kind = SegmentKind::kMove;
+  until(10, 200, true, [&] { return live.edition() == 2 && live.newest() > 60; });
+  EXPECT_TRUE(std::isnan(base()));
+  segment = admittance;
+  kind = SegmentKind::kAdmittance;
+  const std::int64_t start = tick;
+  until(10, 200, true, [&] { return !std::isnan(base()); });
+  // Table 4.1 in x, let go 0.1 m from home: 500 kg, 500 N s/m, 1500 N/m.
+  const double t = 0.01 * (scalar("t_s") * 100.0 - static_cast<double>(start)),
+               wd = std::sqrt(2.75);
+  EXPECT_NEAR(base(), 0.1 * std::exp(-0.5 * t) * (std::cos(wd * t) + 0.5 / wd * std::sin(wd * t)),
+              1e-4);
 }
 
 TEST_F(Live, ShowsTheControllerThatHasTheLegs) {

@@ -53,12 +53,13 @@ bool LiveRun::follow(const state_t& state) {
   const bool engaged = state.engaged != 0, other = shown && state_->engaged != 0;
   if (shown && (engaged == other ? from.epoch < controller_.epoch : other)) return false;
   controller_ = from;
+  state_.reset();
   rows_ = {};
   row_.reset();
   experiment_.reset();
   scene_.reset();
   base_.reset();
-  base_start_.reset();
+  let_go_.reset();
   stop_.reset();
   instants_.clear();
   rate_ = NAN;
@@ -68,11 +69,11 @@ bool LiveRun::follow(const state_t& state) {
 
 void LiveRun::takeState(const state_t& state) {
   if (!follow(state)) return;
+  followBase(state);
   state_ = state;
   heard_ = monotonicNow();
   describe();
   measureRate(state);
-  followBase(state);
   if (stop_ && state.order_source == self_.source && state.order_sequence == stop_->sequence)
     stop_->taken = true;
   const auto row = rows_.add(state);
@@ -97,37 +98,42 @@ void LiveRun::describe() {
     scene_.emplace(*experiment_);
   } catch (const InputError& error) {
     if (!std::exchange(warned_, true)) fmt::print(stderr, "ves view: {}\n", error.what());
+    experiment_.reset();
+    described_.reset();
     return;
   }
   for (const std::string& warning : scene_->warnings())
     fmt::print(stderr, "warning: {}\n", warning);
   ++edition_;
-  nlohmann::ordered_json description = scene_->description();
-  description["scalars"].push_back("real_time_factor");
-  description["scalars"].push_back("stop_requested");
-  scene_text_ = nlohmann::ordered_json{
-      {"edition", edition_},
-      {"width", scene_->width() + 2},
-      {"scene",
-       description}}.dump();
+  nlohmann::ordered_json text;
+  text["edition"] = edition_;
+  text["width"] = scene_->width() + 2;
+  text["scene"] = scene_->description();
+  text["scene"]["scalars"].push_back("real_time_factor");
+  text["scene"]["scalars"].push_back("stop_requested");
+  scene_text_ = text.dump();
 }
 
-/// The base in free space is let go where the platform is; it takes a while to compute.
+/// The base in free space is let go where the platform is; state_ is still the one before. That
+/// takes a while to compute, and who joins later does not know where it was.
 void LiveRun::followBase(const state_t& state) {
-  const bool runs = state.phase == static_cast<int>(Phase::kRunning) && state.segment >= 0 &&
-                    state.kind == static_cast<int>(SegmentKind::kAdmittance);
-  if (runs && experiment_ && !base_start_ && !computing_.valid()) {
-    base_start_ = state.header.sequence;
-    const Vec6 start = Vec6::Map(state.x_desired);
-    computing_ = std::async(std::launch::async, [e = *experiment_, start] {
+  const auto runs = [](const state_t& s) {
+    return s.phase == static_cast<int>(Phase::kRunning) && s.segment >= 0 &&
+           s.kind == static_cast<int>(SegmentKind::kAdmittance);
+  };
+  if (state_ && !let_go_ && runs(state) && !runs(*state_))
+    let_go_ = LetGo{state.header.sequence, Vec6::Map(state.x_desired), false};
+  if (let_go_ && !let_go_->computed && experiment_ && !computing_.valid()) {
+    let_go_->computed = true;
+    computing_ = std::async(std::launch::async, [e = *experiment_, x = let_go_->x] {
       ReferenceMotions references;
-      return baseMotion(e, start, references);
+      return baseMotion(e, x, references);
     });
   }
   if (computing_.valid() &&
       computing_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) {
     const auto base = computing_.get();
-    if (base_start_) base_ = base;
+    if (let_go_ && let_go_->computed) base_ = base;
   }
 }
 
@@ -169,7 +175,7 @@ void LiveRun::requestStop(std::int64_t edition) {
 std::string LiveRun::picture() const {
   if (!row_ || !scene_) return {};
   std::optional<Vec6> base;
-  if (base_ && base_start_) base = base_->at(row_->state.header.sequence - *base_start_);
+  if (base_) base = base_->at(row_->state.header.sequence - let_go_->tick);
   std::vector<float> numbers = scene_->picture(*row_, base);
   numbers.push_back(static_cast<float>(rate_));
   numbers.push_back(!stop_ ? 0.0f : stop_->taken ? 2.0f : 1.0f);

@@ -215,9 +215,11 @@
   }
 
   // Charts: one column of time, one a curve.
+  const pose = (what, names, factor) => names.map(c => [`${c}_${what}`, what === 'actual' ? c : `${c} ${what}`, factor]);
   const SHOWN = [
-    ['position [mm]', ['x', 'y', 'z'].map(c => [`${c}_actual`, c, 1e3]), ['x', 'y', 'z'].map(c => [`${c}_commanded`, `${c} commanded`, 1e3])],
-    ['attitude [deg]', ['alpha', 'beta', 'gamma'].map(c => [`${c}_actual`, c, 180 / Math.PI]), ['alpha', 'beta', 'gamma'].map(c => [`${c}_commanded`, `${c} commanded`, 180 / Math.PI])],
+    ['position [mm]', pose('actual', ['x', 'y', 'z'], 1e3), pose('commanded', ['x', 'y', 'z'], 1e3), pose('measured', ['x', 'y', 'z'], 1e3)],
+    ['attitude [deg]', pose('actual', ['alpha', 'beta', 'gamma'], 180 / Math.PI), pose('commanded', ['alpha', 'beta', 'gamma'], 180 / Math.PI),
+      pose('measured', ['alpha', 'beta', 'gamma'], 180 / Math.PI)],
     ['force, gravity taken out [N]', ['fx', 'fy', 'fz'].map(c => [`${c}_dynamic`, c, 1])],
     ['moment [N m]', ['mx', 'my', 'mz'].map(c => [`${c}_dynamic`, c, 1])],
     ['legs, commanded minus measured [mm]', [1, 2, 3, 4, 5, 6].map(i => [`leg${i}_error_m`, `leg ${i}`, 1e3])],
@@ -256,8 +258,8 @@
     }
     context.restore();
   }
-  function chartOf(title, solid, dashed) {
-    const curves = solid.concat(dashed || []);
+  function chartOf(title, solid, dashed = [], dotted = []) {
+    const curves = solid.concat(dashed, dotted);
     if (!curves.every(c => first.knows(c[0]))) return;
     const row = i => [first.time(i)].concat(curves.map(([name, , factor]) => {
       const y = first.scalar(i, name) * factor;
@@ -269,11 +271,12 @@
     place.className = 'chart';
     element('charts').appendChild(place);
     const series = {}, named = charts.length === 0;
-    (dashed || []).forEach(([, label]) => { series[label] = {strokePattern: [5, 4]}; });
+    dashed.forEach(([, label]) => { series[label] = {strokePattern: [5, 4]}; });
+    dotted.forEach(([, label]) => { series[label] = {strokePattern: [1, 3], strokeWidth: 1}; });
     const chart = new Dygraph(place, rows.length ? rows : [[0].concat(curves.map(() => null))], {
       title, titleHeight: 16, labels: ['t'].concat(curves.map(c => c[1])), series, legend: 'always', labelsSeparateLines: false,
-      legendFormatter: data => data.series.filter(s => !/commanded/.test(s.label)).map(s =>
-        `<span style="color:${s.color}">${s.labelHTML}${data.x === undefined ? '' : ' ' + s.yHTML}</span>`).join('  ') + (dashed ? '  - - commanded' : ''),
+      legendFormatter: data => data.series.filter(s => !/ (commanded|measured)/.test(s.label)).map(s =>
+        `<span style="color:${s.color}">${s.labelHTML}${data.x === undefined ? '' : ' ' + s.yHTML}</span>`).join('  ') + (dashed.length ? '  - - commanded  . . measured' : ''),
       colors: curves.map((c, k) => COLOURS[k % 3]), strokeWidth: 1.4, axisLabelFontSize: 11, gridLineColor: '#88888844',
       underlayCallback: (context, area, g) => drawMarks(context, area, g, named),
       clickCallback: (event, t) => { play(false); show(first.at(t)); }, drawCallback: (c, initial) => { if (!initial) mark(); }});
@@ -293,7 +296,7 @@
     [charts, marks, shown, first] = [[], [], 0, recordings[0]];
     bodies = recordings.map((r, k) => new Bodies(r, world, k ? {colour: 0x3a7ca5, opacity: 0.4} : {}));
     first.pictures.forEach((_, i) => markOf(i));
-    for (const [title, solid, dashed] of SHOWN) chartOf(title, solid, dashed);
+    for (const chart of SHOWN) chartOf(...chart);
     fit();
     for (const place of document.querySelectorAll('.arm')) place.hidden = first.scene.arm.length < 2;
     document.title = first.scene.name;

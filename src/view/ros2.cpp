@@ -83,8 +83,9 @@ class McapExport::Impl {
       return;
     }
     const auto state = event.as<state_t>();
+    const bool first = tick_ < 0;
     if (!state || !ours(*state)) return;
-    followBase(*state);
+    followBase(*state, first);
     // Its truth and its sample came before it: the row of the one before is not needed.
     rows_.add(*state);
     tick(*rows_.finish(), now);
@@ -157,8 +158,9 @@ class McapExport::Impl {
   }
 
   /// The base in free space, from where the platform is let go in the first admittance segment.
-  void followBase(const state_t& state) {
-    const bool begins = base_start_ < 0 && state.phase == static_cast<int>(Phase::kRunning) &&
+  void followBase(const state_t& state, bool first) {
+    const bool begins = !first && base_start_ < 0 &&
+                        state.phase == static_cast<int>(Phase::kRunning) &&
                         state.kind == static_cast<int>(SegmentKind::kAdmittance);
     if (begins) {
       base_start_ = state.header.sequence;

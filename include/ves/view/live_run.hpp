@@ -66,7 +66,12 @@ class LiveRun : public LiveSource {
 
   std::future<std::optional<BaseMotion>> computing_;
   std::optional<BaseMotion> base_;
-  std::optional<std::int64_t> base_start_;  // tick
+  struct LetGo {
+    std::int64_t tick;
+    Vec6 x;  // [m, rad] from home
+    bool computed;
+  };
+  std::optional<LetGo> let_go_;
 
   struct Instant {
     std::int64_t tick, wall;  // [-], [ns]
