@@ -10,6 +10,7 @@ int collectCommand(int argc, char** argv);
 int compareCommand(int argc, char** argv);
 int controllerCommand(int argc, char** argv);
 int demoCommand(int argc, char** argv);
+int conformCommand(int argc, char** argv);
 int doctorCommand(int argc, char** argv);
 int faultsCommand(int argc, char** argv);
 int identifyCommand(int argc, char** argv);

@@ -35,6 +35,7 @@ constexpr Command kCommands[] = {
     {"faults", "inject the faults of the table, say what was expected and what happened",
      faultsCommand},
     {"robot", "what a robot description holds, and what of it moves", robotCommand},
+    {"conform", "does the machine on the bus keep its side of it", conformCommand},
     {"doctor", "can this machine keep the loop's time, and what to do where it cannot",
      doctorCommand},
 };

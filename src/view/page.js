@@ -277,7 +277,7 @@
       title, titleHeight: 16, labels: ['t'].concat(curves.map(c => c[1])), series, legend: 'always', labelsSeparateLines: false,
       legendFormatter: data => data.series.filter(s => !/ (commanded|measured)/.test(s.label)).map(s =>
         `<span style="color:${s.color}">${s.labelHTML}${data.x === undefined ? '' : ' ' + s.yHTML}</span>`).join('  ') + (dashed.length ? '  - - commanded  . . measured' : ''),
-      colors: curves.map((c, k) => COLOURS[k % 3]), strokeWidth: 1.4, axisLabelFontSize: 11, gridLineColor: '#88888844',
+      colors: curves.map((c, k) => COLOURS[k % 3]), strokeWidth: 1.4, axisLabelFontSize: 11, axes: {y: {pixelsPerLabel: 24}}, gridLineColor: '#88888844',
       underlayCallback: (context, area, g) => drawMarks(context, area, g, named),
       clickCallback: (event, t) => { play(false); show(first.at(t)); }, drawCallback: (c, initial) => { if (!initial) mark(); }});
     const cursor = document.createElement('div');

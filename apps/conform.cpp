@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// ves conform: does a machine on the bus keep its side of it?
+#include "ves/doctor/conform.hpp"
+#include "app.hpp"
+#include "commands.hpp"
+#include "ves/realtime/realtime.hpp"
+#include "ves/run/announcer.hpp"
+#include "ves/transport/channels.hpp"
+
+namespace ves::app {
+namespace {
+
+constexpr std::int64_t kFirstSample = 10'000'000'000;  // [ns]
+
+/// Commands nothing.
+std::vector<Requirement> listen(const Experiment& experiment, const std::string& url,
+                                double seconds) {
+  const Identity self = Identity::draw();
+  const setup_t setup = setupOf(experiment, false, header(self, 0, 0));
+  Announcer announcer(url, describe(experiment, self, 0), setup);
+  Bus bus(url);
+  std::optional<SampleJudge> judge;
+  const std::int64_t start = monotonicNow();
+  bus.subscribe(channel::kSample, [&](const std::string&, const void* data, std::uint32_t size) {
+    if (!judge) judge.emplace(setup, monotonicNow());
+    judge->take(data, size, monotonicNow());
+  });
+  while (!judge && !stop_requested && monotonicNow() - start < kFirstSample) bus.wait(100);
+  if (!judge) return {{"samples", "heard", "none in 10 s", false}};
+  const std::int64_t end = monotonicNow() + static_cast<std::int64_t>(seconds * 1e9);
+  while (!stop_requested && monotonicNow() < end) bus.wait(20);
+  return judge->verdict(monotonicNow());
+}
+
+/// Arms, 20 mm up and home again, parks.
+Requirement move(const Experiment& experiment, const ProcessOptions& process) {
+  const RunResult result = runController(experiment, process, [](const TickState&) {
+    return stop_requested ? Order{Request::kStop, {}, {}} : Order();
+  });
+  Requirement out{"a gentle move", "arms, 20 mm up and back, parks", "",
+                  result.phase == Phase::kParked && !result.aborted};
+  if (out.kept)
+    out.found = fmt::format("parked after {:.1f} s", result.simulated);
+  else if (result.phase == Phase::kDisarmed)
+    out.found = fmt::format("not armed: {}", result.cause == Check::kCount
+                                                 ? "no stream of new samples long enough"
+                                                 : name(result.cause));
+  else if (result.phase == Phase::kStopped)
+    out.found =
+        fmt::format("stopped by the {} check in tick {}", name(result.cause), result.cause_tick);
+  else
+    out.found = "ended early";
+  return out;
+}
+
+}  // namespace
+
+int conformCommand(int argc, char** argv) {
+  CLI::App cli(
+      "Listens to the machine on the bus as a controller that commands nothing, and says which "
+      "requirements of docs/machine.md it keeps. With --move it then arms and moves the platform "
+      "20 mm "
+      "up and back. Status 1 when one is not kept. The scenario says which machine is expected.",
+      "ves conform");
+  Options options;
+  bool moves = false;
+  double seconds = 3.0;
+  options.addExperiment(cli);
+  cli.add_option("--url", options.process.url, "LCM bus")->capture_default_str();
+  cli.add_option("--seconds", seconds, "to listen")
+      ->check(inRange(0.5, 3600.0))
+      ->capture_default_str();
+  cli.add_flag("--move", moves, "move the platform, when all else is well");
+  return run(cli, argc, argv, [&] {
+    options.overrides.push_back(
+        "program=[{move: {}}, {move: {to: {z_m: 0.02}, duration_s: 2}}, {move: {}}]");
+    const Experiment experiment = options.load();
+    catchSignals();
+    fmt::print(stderr, "listening on {} for {:g} s\n", options.process.url, seconds);
+    std::vector<Requirement> all = listen(experiment, options.process.url, seconds);
+    const auto kept = [](const Requirement& r) { return r.kept; };
+    const bool well = std::all_of(all.begin(), all.end(), kept);
+    if (moves && well) {
+      options.process.start = true;
+      all.push_back(move(experiment, options.process));
+    }
+    for (const Requirement& r : all)
+      fmt::print("{} {:<16} {:<42} {}\n", r.kept ? "ok" : "NO", r.name, r.asked, r.found);
+    if (moves && !well) fmt::print("nothing was moved\n");
+    return std::all_of(all.begin(), all.end(), kept) ? kDone : kTripped;
+  });
+}
+
+}  // namespace ves::app

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Whether a machine on the bus says what docs/machine.md asks of it.
+#pragma once
+
+#include <array>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "ves/transport/messages.hpp"
+
+namespace ves {
+
+struct Requirement {
+  std::string name, asked, found;
+  bool kept = true;
+};
+
+/// Judges the samples of a machine in real time that nobody commands.
+class SampleJudge {
+ public:
+  /// `now` [ns] by the clock of take().
+  SampleJudge(const setup_t& setup, std::int64_t now);
+
+  /// The bytes of a message on VES_SAMPLE, when they come.
+  void take(const void* data, std::int64_t size, std::int64_t now);
+
+  std::int64_t taken() const { return taken_; }  // [-] samples of the machine that was heard first
+  /// Of what has come until `now`.
+  std::vector<Requirement> verdict(std::int64_t now) const;
+
+ private:
+  struct Span {
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    void add(double x);
+    double width() const { return high - low; }
+  };
+  void judge(const sample_t& sample, std::int64_t now);
+
+  setup_t setup_;
+  std::int64_t start_;  // [ns]
+  std::optional<header_t> first_, last_;
+  std::int64_t taken_ = 0, malformed_ = 0, others_ = 0, backwards_ = 0, lost_ = 0,
+               answering_ = 0;                      // [-]
+  std::int64_t first_heard_ = 0, heard_ = 0;        // [ns]
+  std::int64_t longest_gap_ = 0, stood_still_ = 0;  // [ns], [-]
+  std::int64_t tick_ = -1;                          // the last with a sample
+  std::int64_t fresh_ = 0, most_fresh_ = 0;         // [-] ticks in a row with one
+  std::string out_of_range_;                        // the first
+  std::uint32_t switches_ = kAllSwitchesClosed;     // closed in every sample
+  Span pressure_;
+  std::array<Span, 6> channels_, legs_;  // [count]
+  std::string joints_;                   // the first that is wrong
+};
+
+}  // namespace ves

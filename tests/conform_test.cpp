@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// A machine that keeps all requirements of docs/machine.md, and one for each that breaks it.
+#include "ves/doctor/conform.hpp"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <set>
+
+#include "support/programs.hpp"
+#include "support/rig.hpp"
+#include "ves/transport/bus.hpp"
+
+namespace ves {
+namespace {
+
+using Names = std::set<std::string>;
+
+setup_t setup() {
+  return setupOf(test::experiment("puma_on_table_4_1"), false, header({1, 1}, 0, 0));
+}
+
+/// Two seconds of a good machine at `rate`, spoilt sample by sample; what is not kept. `spoil` may
+/// drop a sample (false).
+Names broken(const std::function<bool(int, sample_t&)>& spoil, double rate = 500.0) {
+  const setup_t s = setup();
+  SampleJudge judge(s, 0);
+  const auto period = static_cast<std::int64_t>(1e9 / rate);
+  const int count = static_cast<int>(2.0 * rate);
+  for (int i = 0; i < count; ++i) {
+    sample_t m{};
+    const std::int64_t now = i * period;
+    m.header = header({42, 5}, 100 + i, 7'000'000'000 + now);
+    m.answers = -1;
+    for (int k = 0; k < 6; ++k) m.adc[k] = (i + k) % 5;
+    m.adc[6] = (s.pressure_min + s.pressure_max) / 2;
+    for (int k = 0; k < 6; ++k) m.legs[k] = s.leg_home[k] + i % 2;
+    m.switches = static_cast<int>(kAllSwitchesClosed);
+    m.temperature = 20.0;
+    if (!spoil(i, m)) continue;
+    std::vector<std::uint8_t> bytes(static_cast<std::size_t>(m.getEncodedSize()));
+    m.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+    judge.take(bytes.data(), std::ssize(bytes), now);
+  }
+  Names out;
+  for (const Requirement& r : judge.verdict(2'000'000'000))
+    if (!r.kept) out.insert(r.name);
+  return out;
+}
+
+TEST(Conform, AGoodMachineKeepsAll) {
+  const auto good = [](int, sample_t&) { return true; };
+  for (const double rate : {95.0, 100.0, 200.0, 500.0, 1000.0})
+    EXPECT_EQ(broken(good, rate), Names());
+}
+
+TEST(Conform, WhatIsNotKeptIsNamedAndNothingElse) {
+  const auto at = [](int when, const std::function<void(sample_t&)>& spoil) {
+    return [=](int i, sample_t& m) {
+      if (i == when) spoil(m);
+      return true;
+    };
+  };
+  EXPECT_EQ(broken([](int, sample_t&) { return true; }, 80.0), Names({"ticks in a row"}));
+  EXPECT_EQ(broken([](int i, sample_t&) { return i < 400 || i > 500; }), Names({"longest gap"}));
+  EXPECT_EQ(broken([](int i, sample_t&) { return i < 900; }), Names({"longest gap"}));
+  EXPECT_EQ(broken([](int i, sample_t&) { return i % 3 != 0; }), Names());  // lost on the way
+  EXPECT_EQ(broken(at(500, [](sample_t& m) { m.header.sequence -= 50; })), Names({"sequence"}));
+  EXPECT_EQ(broken(at(500, [](sample_t& m) { m.header.source = 43; })), Names({"source"}));
+  EXPECT_EQ(broken(at(500, [](sample_t& m) { m.header.epoch = 6; })), Names({"source"}));
+  EXPECT_EQ(broken([](int, sample_t& m) {
+              m.header.epoch = 0;
+              return true;
+            }),
+            Names({"epoch"}));
+  EXPECT_EQ(broken([](int i, sample_t& m) {
+              if (i > 400) m.header.time_ns = 1;
+              return true;
+            }),
+            Names({"clock"}));
+  EXPECT_EQ(broken([](int i, sample_t& m) {
+              m.header.time_ns += i * 100'000;  // 5 % fast
+              return true;
+            }),
+            Names({"clock"}));
+  EXPECT_EQ(broken(at(500, [](sample_t& m) { m.adc[2] = 40000; })), Names({"ranges"}));
+  EXPECT_EQ(broken(at(500, [](sample_t& m) { m.q[1] = NAN; })), Names({"ranges", "joints"}));
+  EXPECT_EQ(broken(at(500, [](sample_t& m) { m.temperature = NAN; })), Names({"ranges"}));
+  EXPECT_EQ(broken(at(500, [](sample_t& m) { m.switches = 1; })), Names({"safety loops"}));
+  EXPECT_EQ(broken(at(500, [](sample_t& m) { m.adc[6] = 0; })), Names({"pressure"}));
+  EXPECT_EQ(broken([](int, sample_t& m) {
+              std::fill(m.adc, m.adc + 6, 12);
+              return true;
+            }),
+            Names({"force sensor"}));
+  EXPECT_EQ(broken([](int, sample_t& m) {
+              std::fill(m.adc, m.adc + 5, 12);  // one lives
+              return true;
+            }),
+            Names());
+  EXPECT_EQ(broken(at(500, [](sample_t& m) { m.legs[3] += 3; })), Names({"legs at rest"}));
+  EXPECT_EQ(broken([](int, sample_t& m) {
+              m.legs[5] = 16000;
+              return true;
+            }),
+            Names({"stroke"}));
+  EXPECT_EQ(broken(at(500, [](sample_t& m) { m.q[6] = 0.1; })), Names({"joints"}));
+  EXPECT_EQ(broken(at(500, [](sample_t& m) { m.q[0] = 10.0; })), Names({"joints"}));
+  EXPECT_EQ(broken(at(500, [](sample_t& m) { m.answers = 3; })), Names({"answers"}));
+  EXPECT_EQ(broken([](int, sample_t&) { return false; }), Names({"samples"}));
+}
+
+TEST(Conform, BytesThatAreNoSampleAreCounted) {
+  SampleJudge judge(setup(), 0);
+  judge.take("nothing", 7, 5);
+  const std::vector<Requirement> all = judge.verdict(1'000'000'000);
+  ASSERT_EQ(all.size(), 2u);
+  EXPECT_FALSE(all[0].kept);
+  EXPECT_FALSE(all[1].kept);
+  EXPECT_EQ(all[1].found, "1 malformed");
+}
+
+using ConformProgram = test::Programs;
+
+TEST_F(ConformProgram, OurOwnPlantKeepsAllAndMoves) {
+  enterPrivateBus();
+  const std::string conform = app("conform") + "z_sine " + patient();
+  const test::Output none = test::sh(conform + " --move");
+  EXPECT_EQ(none.status, 1);
+  EXPECT_NE(none.text.find("NO samples"), std::string::npos) << none.text;
+  EXPECT_NE(none.text.find("nothing was moved"), std::string::npos) << none.text;
+  Process plant = start("plant", {"z_sine"});
+  const test::Output all = test::sh(conform + " --move");
+  EXPECT_EQ(all.status, 0) << all.text;
+  EXPECT_EQ(all.text.find("NO "), std::string::npos) << all.text;
+  EXPECT_NE(all.text.find("parked after"), std::string::npos) << all.text;
+}
+
+}  // namespace
+}  // namespace ves
