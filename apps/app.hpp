@@ -14,6 +14,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <iostream>
 #include <string>
 #include <thread>
@@ -44,6 +45,10 @@ inline CLI::Validator inRange(double lo, double hi) {
 
 inline int allCores() {
   return static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+}
+
+inline void addUrl(CLI::App& cli, std::string& url, const char* what = "LCM bus") {
+  cli.add_option("--url", url, what)->capture_default_str();
 }
 
 inline void addWorkers(CLI::App& cli, int& workers, const std::string& what) {
@@ -100,7 +105,7 @@ struct Options {
     cli.add_flag("--force", force, "admittance control even where it would diverge");
   }
   void addBus(CLI::App& cli) {
-    cli.add_option("--url", process.url, "LCM bus")->capture_default_str();
+    addUrl(cli, process.url);
     cli.add_flag("--lockstep", process.lockstep, "as fast as possible, nothing waits on a clock");
     cli.add_flag("--realtime", process.realtime, "insist on SCHED_FIFO and locked memory");
     cli.add_flag("--private-bus", private_bus, "on a network of this run's own");
@@ -134,6 +139,26 @@ inline void printWords(const CLI::App& cli) {
   }
   for (const CLI::Option* option : cli.get_options())
     for (const std::string& name : option->get_lnames()) fmt::print("--{} ", name);
+}
+
+/// Why a run of the controller is no success: "not armed: ..." or "stopped by ..."; else empty.
+inline std::string whyNot(const RunResult& result) {
+  if (result.phase == Phase::kDisarmed)
+    return fmt::format(
+        "not armed: {}{}",
+        result.cause == Check::kCount ? "no stream of new samples long enough" : name(result.cause),
+        result.rejected.empty() ? "" : "; " + result.rejected);
+  if (result.phase == Phase::kStopped)
+    return fmt::format("stopped by the {} check in tick {}", name(result.cause), result.cause_tick);
+  return {};
+}
+
+/// Throws InputError, naming the option, when it cannot be written.
+inline void writeGiven(const char* option, const std::string& file, const std::string& text) {
+  std::ofstream out(file, std::ios::binary);
+  out << text;
+  out.close();
+  if (!out) throw InputError(fmt::format("{} {}: {}", option, file, std::strerror(errno)));
 }
 
 /// Environment: the token of a socket that `ves view` inherits. Arguments are for all to see.

@@ -8,7 +8,7 @@
 #include "app.hpp"
 #include "commands.hpp"
 #include "ves/results/series.hpp"
-#include "ves/run/bus_recorder.hpp"
+#include "ves/run/follow_bus.hpp"
 #include "ves/transport/channels.hpp"
 #include "ves/view/ros2.hpp"
 
@@ -65,7 +65,7 @@ int collectCommand(int argc, char** argv) {
   cli.add_option("--out", out, "file; standard output by default");
   cli.add_option("--mcap", mcap, "everything into this MCAP file for Foxglove, PlotJuggler, Rerun");
   cli.add_flag("--follow", follow, "the run on the bus instead of a log, with --mcap");
-  cli.add_option("--url", url, "LCM bus, with --follow")->capture_default_str();
+  addUrl(cli, url, "LCM bus, with --follow");
   return run(cli, argc, argv, [&] {
     if (follow == !log.empty() || (follow && mcap.empty()))
       throw InputError("want a log, or --follow with --mcap FILE");

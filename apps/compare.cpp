@@ -3,8 +3,6 @@
 // ves compare: what runs differ in, as a table and as pictures.
 #include <fmt/ranges.h>
 
-#include <fstream>
-
 #include "app.hpp"
 #include "commands.hpp"
 #include "ves/base/coordinates.hpp"
@@ -64,13 +62,8 @@ Panel panelOf(const std::vector<ComparedRun>& runs, const std::string& column,
     const auto at =
         std::find_if(all.begin(), all.end(), [&](const Column& one) { return one.name == column; });
     if (at == all.end()) continue;
-    Line line{runs[k].name, {}, {}, static_cast<int>(k % 3), k >= 3};
-    for (const Row& row : runs[k].series.rows) {
-      const double y = at->value(row) * scale;
-      if (!std::isfinite(y)) continue;
-      line.x.push_back(row.t);
-      line.y.push_back(y);
-    }
+    const Line line = lineOf(runs[k].name, runs[k].series, static_cast<int>(k),
+                             [&](const Row& row) { return at->value(row) * scale; });
     if (!line.x.empty()) panel.lines.push_back(line);
   }
   return panel;
@@ -133,11 +126,9 @@ int compareCommand(int argc, char** argv) {
           half ? "Moment that admittance control feels." : "Force that admittance control feels.",
           wrench);
     }
-    std::ofstream out(html, std::ios::binary);
-    out << page.html("Runs side by side",
-                     fmt::format("{}", fmt::join(header.begin() + 1, header.end(), ", ")));
-    out.close();
-    if (!out) throw InputError(fmt::format("--html {}: {}", html, std::strerror(errno)));
+    writeGiven("--html", html,
+               page.html("Runs side by side",
+                         fmt::format("{}", fmt::join(header.begin() + 1, header.end(), ", "))));
     return kDone;
   });
 }

@@ -40,17 +40,8 @@ Requirement move(const Experiment& experiment, const ProcessOptions& process) {
   });
   Requirement out{"a gentle move", "arms, 20 mm up and back, parks", "",
                   result.phase == Phase::kParked && !result.aborted};
-  if (out.kept)
-    out.found = fmt::format("parked after {:.1f} s", result.simulated);
-  else if (result.phase == Phase::kDisarmed)
-    out.found = fmt::format("not armed: {}", result.cause == Check::kCount
-                                                 ? "no stream of new samples long enough"
-                                                 : name(result.cause));
-  else if (result.phase == Phase::kStopped)
-    out.found =
-        fmt::format("stopped by the {} check in tick {}", name(result.cause), result.cause_tick);
-  else
-    out.found = "ended early";
+  out.found = out.kept ? fmt::format("parked after {:.1f} s", result.simulated) : whyNot(result);
+  if (out.found.empty()) out.found = "ended early";
   return out;
 }
 
@@ -60,14 +51,14 @@ int conformCommand(int argc, char** argv) {
   CLI::App cli(
       "Listens to the machine on the bus as a controller that commands nothing, and says which "
       "requirements of docs/machine.md it keeps. With --move it then arms and moves the platform "
-      "20 mm "
-      "up and back. Status 1 when one is not kept. The scenario says which machine is expected.",
+      "20 mm up and back. Status 1 when one is not kept. The scenario says which machine is "
+      "expected.",
       "ves conform");
   Options options;
   bool moves = false;
   double seconds = 3.0;
   options.addExperiment(cli);
-  cli.add_option("--url", options.process.url, "LCM bus")->capture_default_str();
+  addUrl(cli, options.process.url);
   cli.add_option("--seconds", seconds, "to listen")
       ->check(inRange(0.5, 3600.0))
       ->capture_default_str();

@@ -31,14 +31,8 @@ int serve(ControllerOptions& options) {
     return stop_requested ? Order{Request::kStop, {}, {}} : Order();
   });
   if (result.good()) return kDone;
-  if (result.phase == Phase::kDisarmed)
-    fmt::print(
-        stderr, "ves controller: not armed: {}{}\n",
-        result.cause == Check::kCount ? "no stream of new samples long enough" : name(result.cause),
-        result.rejected.empty() ? "" : "; " + result.rejected);
-  else if (result.phase == Phase::kStopped)
-    fmt::print(stderr, "ves controller: stopped by the {} check in tick {}\n", name(result.cause),
-               result.cause_tick);
+  if (const std::string why = whyNot(result); !why.empty())
+    fmt::print(stderr, "ves controller: {}\n", why);
   return kTripped;
 }
 

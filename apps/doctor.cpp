@@ -75,7 +75,7 @@ int doctorCommand(int argc, char** argv) {
   cli.add_option("--seconds", seconds, "of each measurement")
       ->check(inRange(0.1, 3600.0))
       ->capture_default_str();
-  cli.add_option("--url", url, "LCM bus")->capture_default_str();
+  addUrl(cli, url);
   return run(cli, argc, argv, [&] {
     std::vector<Finding> findings = examineMachine();
     const bool shared = busWorks(url);

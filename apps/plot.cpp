@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // ves plot: columns of a recorded run as a picture.
-#include <fstream>
+#include <cmath>
 
 #include "app.hpp"
 #include "commands.hpp"
@@ -53,13 +53,10 @@ int plotCommand(int argc, char** argv) {
         at = panels.insert(
             at, {unit, {"time [s]", unit.empty() ? "-" : fmt::format("[{}]", unit), {}, false}});
       std::vector<Line>& lines = at->second.lines;
-      Line line{column.name, {}, {}, static_cast<int>(lines.size() % 3), lines.size() >= 3};
-      for (const Row& row : series.rows) {
-        const double y = column.value(row);
-        if (row.t < from || row.t > from + duration || !std::isfinite(y)) continue;
-        line.x.push_back(row.t);
-        line.y.push_back(y);
-      }
+      const Line line =
+          lineOf(column.name, series, static_cast<int>(lines.size()), [&](const Row& row) {
+            return row.t < from || row.t > from + duration ? NAN : column.value(row);
+          });
       if (!line.x.empty()) lines.push_back(line);
     }
     for (std::size_t i = 0; i < select.size(); ++i)
@@ -72,10 +69,7 @@ int plotCommand(int argc, char** argv) {
     if (all.empty()) throw InputError("--select: the columns have no number in that time");
     if (all.size() > kMostPanels)
       throw InputError(fmt::format("--select: {} units, want at most {}", all.size(), kMostPanels));
-    std::ofstream file(out, std::ios::binary);
-    file << svgFile(all);
-    file.close();
-    if (!file) throw InputError(fmt::format("--out {}: {}", out, std::strerror(errno)));
+    writeGiven("--out", out, svgFile(all));
     fmt::print("{}\n", out);
     return kDone;
   });

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // ves view: a run in a browser, as it happens or from its log; or a log as one file.
-#include <fstream>
-
 #include "app.hpp"
 #include "commands.hpp"
 #include "ves/results/series.hpp"
@@ -37,10 +35,7 @@ std::string recordedPage(const ViewOptions& options, double rate) {
 int writePage(const ViewOptions& options) {
   constexpr double kSeen = 60.0;  // [1/s]
   const std::string text = recordedPage(options, options.rate.value_or(kSeen));
-  std::ofstream out(options.html, std::ios::binary);
-  out << text;
-  out.close();
-  if (!out) throw InputError(fmt::format("--html {}: {}", options.html, std::strerror(errno)));
+  writeGiven("--html", options.html, text);
   fmt::print("{} ({:.1f} MB): open it in a browser\n", options.html,
              static_cast<double>(text.size()) * 1e-6);
   return kDone;
@@ -99,7 +94,7 @@ int viewCommand(int argc, char** argv) {
   cli.add_option("--rate", options.rate,
                  "[1/s] pictures of a log; 60 in a file, every tick in a browser")
       ->check(inRange(0.1, 1000.0));
-  cli.add_option("--url", options.url, "LCM bus")->capture_default_str();
+  addUrl(cli, options.url);
   cli.add_option("--port", options.port, "8780 by default, or a free one where that is taken")
       ->check(CLI::Range(0, 65535));
   cli.add_option("--bind", options.address, "address of this machine that browsers connect to")

@@ -53,7 +53,7 @@ class Machine:
         self.period = 1.0 / rate
         self.bus = lcm.LCM(url)
         self.setup = self.command = self.hardware = self.reference = None
-        self.heard = self.parking = 0.0
+        self.heard = 0.0
         self.source, self.epoch = random.getrandbits(62), time.time_ns()
         self.sequence = 0
         self.bus.subscribe("VES_SETUP", self.on_setup)

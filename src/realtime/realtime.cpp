@@ -31,6 +31,12 @@ std::int64_t monotonicNow() noexcept {
   return now.tv_sec * kSecond + now.tv_nsec;
 }
 
+std::int64_t wallNow() noexcept {
+  timespec now;
+  clock_gettime(CLOCK_REALTIME, &now);
+  return now.tv_sec * kSecond + now.tv_nsec;
+}
+
 std::int64_t Ticker::wait() noexcept {
   next_ += period_;
   std::int64_t missed = 0;

@@ -10,13 +10,16 @@
 
 namespace ves {
 
+bool inAdmittance(const state_t& state) noexcept {
+  return state.phase == static_cast<int>(Phase::kRunning) &&
+         state.kind == static_cast<int>(SegmentKind::kAdmittance);
+}
+
 void eachTick(const Series& series, const std::function<void(const Row&, double)>& take) {
   const double* start = nullptr;
   int segment = -1;
   for (const Row& row : series.rows) {
-    if (row.state.phase != static_cast<int>(Phase::kRunning) ||
-        row.state.kind != static_cast<int>(SegmentKind::kAdmittance))
-      continue;
+    if (!inAdmittance(row.state)) continue;
     if (!start) {
       start = &row.t;
       segment = row.state.segment;

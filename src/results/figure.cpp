@@ -44,6 +44,18 @@ void replaceAll(std::string& text, const std::string& from, const std::string& t
 
 }  // namespace
 
+Line lineOf(const std::string& name, const Series& series, int k,
+            const std::function<double(const Row&)>& value) {
+  Line line{name, {}, {}, k % 3, k >= 3};
+  for (const Row& row : series.rows) {
+    const double y = value(row);
+    if (!std::isfinite(y)) continue;
+    line.x.push_back(row.t);
+    line.y.push_back(y);
+  }
+  return line;
+}
+
 std::string svg(const std::vector<Panel>& panels) {
   const std::size_t columns = std::min<std::size_t>(2, panels.size());
   const std::size_t rows = (panels.size() + columns - 1) / columns;

@@ -5,8 +5,6 @@
 #include <poll.h>
 #include <signal.h>
 
-#include <chrono>
-
 #include "ves/realtime/realtime.hpp"
 #include "ves/transport/channels.hpp"
 
@@ -17,12 +15,6 @@ constexpr int kRepeat = 200;                          // [ms] an order without a
 constexpr int kRepeats = 10;                          // [-]
 constexpr std::int64_t kFirstState = 15'000'000'000;  // [ns]
 
-std::int64_t wallClock() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(
-             std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
-
 }  // namespace
 
 Session::Session(const Experiment& experiment, const LaunchOptions& options)
@@ -31,7 +23,7 @@ Session::Session(const Experiment& experiment, const LaunchOptions& options)
   if (!process.log.empty() && !process.lockstep) {
     log_file_ = process.log;
     log_ = std::make_unique<LogWriter>(process.log);
-    log_->write(channel::kExperiment, describe(experiment, {}, 0), wallClock());
+    log_->write(channel::kExperiment, describe(experiment, {}, 0), wallNow());
   }
   bus_.subscribe("VES_(SAMPLE|LEG_COMMAND|STATE|TRUTH|TIMING|ROBOT|OPERATOR)",
                  [this](const std::string& channel, const void* data, std::uint32_t size) {
@@ -59,7 +51,7 @@ void Session::receive(const std::string& channel, const void* data, std::uint32_
   }
   if (log_) {
     const bool whole = log_->lost() == 0;
-    log_->write(channel, data, size, wallClock());
+    log_->write(channel, data, size, wallNow());
     if (whole && log_->lost() > 0)
       std::fputs(fmt::format("warning: {}: {}; events of the log are being lost, the run goes on\n",
                              log_file_, log_->trouble())

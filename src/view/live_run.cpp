@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
 #include <cstring>
 
 #include "ves/realtime/realtime.hpp"
@@ -34,8 +33,6 @@ LiveRun::LiveRun(const std::string& url) : bus_(url) {
                    }
                  });
 }
-
-LiveRun::~LiveRun() = default;
 
 bool LiveRun::listen() {
   const std::int64_t newest = newest_, edition = edition_;
@@ -117,10 +114,7 @@ void LiveRun::describe() {
 /// The base in free space is let go where the platform is; state_ is still the one before. That
 /// takes a while to compute, and who joins later does not know where it was.
 void LiveRun::followBase(const state_t& state) {
-  const auto runs = [](const state_t& s) {
-    return s.phase == static_cast<int>(Phase::kRunning) && s.segment >= 0 &&
-           s.kind == static_cast<int>(SegmentKind::kAdmittance);
-  };
+  const auto runs = [](const state_t& s) { return s.segment >= 0 && inAdmittance(s); };
   if (state_ && !let_go_ && runs(state) && !runs(*state_))
     let_go_ = LetGo{state.header.sequence, Vec6::Map(state.x_desired), false};
   if (let_go_ && !let_go_->computed && experiment_ && !computing_.valid()) {

@@ -4,7 +4,6 @@
 (function () {
   const KEPT = 60;          // [s] of a live run
   const REDRAWN = 250;      // [ms] between a live run's charts
-  const ARM_RADIUS = 0.12;  // [m]
   const UP = new THREE.Vector3(0, 1, 0);  // of three.js's cylinders
   const COLOURS = ['#0067a8', '#c14e00', '#00805e'];
   const NUMBERS = 7;  // of a frame: position, quaternion
@@ -79,7 +78,7 @@
       this.force = new THREE.ArrowHelper(new THREE.Vector3(0, 0, 1), new THREE.Vector3(), 0.1, 0xc1121f, 0.08, 0.05);
       world.add(this.force);
       this.arm = recording.scene.arm.slice(1).map(() => {
-        const mesh = new THREE.Mesh(new THREE.CylinderBufferGeometry(ARM_RADIUS, ARM_RADIUS, 1, 16),
+        const mesh = new THREE.Mesh(new THREE.CylinderBufferGeometry(recording.scene.arm_radius, recording.scene.arm_radius, 1, 16),
           new THREE.MeshStandardMaterial({color: look.colour || 0xb9b2a0, roughness: 0.7, transparent: look.opacity < 1, opacity: look.opacity || 1}));
         world.add(mesh);
         return mesh;

@@ -159,9 +159,7 @@ class McapExport::Impl {
 
   /// The base in free space, from where the platform is let go in the first admittance segment.
   void followBase(const state_t& state, bool first) {
-    const bool begins = !first && base_start_ < 0 &&
-                        state.phase == static_cast<int>(Phase::kRunning) &&
-                        state.kind == static_cast<int>(SegmentKind::kAdmittance);
+    const bool begins = !first && base_start_ < 0 && inAdmittance(state);
     if (begins) {
       base_start_ = state.header.sequence;
       base_segment_ = state.segment;

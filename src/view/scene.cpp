@@ -22,6 +22,7 @@ using Json = nlohmann::ordered_json;
 constexpr double kLinkRadius = 0.035;   // [m] of what has no shape in its description
 constexpr double kPlate = 0.02;         // [m] thickness
 constexpr double kRodRadius = 0.018;    // [m]
+constexpr double kArmRadius = 0.12;     // [m]
 constexpr double kShortestLink = 1e-3;  // [m] worth drawing
 
 Json json(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
@@ -235,6 +236,7 @@ void Scene::addArm() {
   const Transform X_IP = geometry_.fromHome(Pose());
   for (const Vec3& p : arm_.points) points.push_back(json(X_IP * p));
   description_["arm"] = points;
+  description_["arm_radius"] = kArmRadius;
 }
 
 std::vector<float> Scene::picture(const Row& row, const std::optional<Vec6>& base) const {

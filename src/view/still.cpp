@@ -78,7 +78,6 @@ constexpr const char* kMetal = "#8d99a6";
 constexpr const char* kPlate = "#6b7885";
 constexpr const char* kRobot = "#e0903a";
 constexpr const char* kArm = "#b9a878";
-constexpr double kArmWidth = 0.24;  // [m]
 
 }  // namespace
 
@@ -132,7 +131,8 @@ std::string still(const Scene& scene, const std::vector<float>& picture, StillVi
   }
   if (view == StillView::kArm)
     for (std::size_t i = 1; i < d["arm"].size(); ++i)
-      drawing.stroke(point(d["arm"][i - 1]), point(d["arm"][i]), kArmWidth, kArm, true);
+      drawing.stroke(point(d["arm"][i - 1]), point(d["arm"][i]), 2.0 * number(d["arm_radius"]),
+                     kArm, true);
   return drawing.svg();
 }
 

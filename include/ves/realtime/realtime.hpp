@@ -10,6 +10,9 @@ namespace ves {
 /// CLOCK_MONOTONIC: no clock step reaches it.
 std::int64_t monotonicNow() noexcept;  // [ns]
 
+/// Since 1970, as logs are stamped.
+std::int64_t wallNow() noexcept;  // [ns]
+
 /// An absolute schedule. A missed deadline is counted and skipped, never made up; the phase stays.
 class Ticker {
  public:

@@ -19,6 +19,9 @@ struct Motion {
   std::vector<Vec6> x, x_dot;  // [m, rad], [m/s, rad/s]
 };
 
+/// Admittance control runs in this tick.
+bool inAdmittance(const state_t& state) noexcept;
+
 /// Calls take(row, seconds since its first tick) in every tick of the first admittance segment.
 void eachTick(const Series& series, const std::function<void(const Row&, double)>& take);
 

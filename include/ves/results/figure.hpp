@@ -3,6 +3,7 @@
 // Figures of a page, as SVG.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,10 @@ struct Line {
   int colour = 0;  // [-] 0 to 2
   bool dashed = false;
 };
+
+/// A value over time where it is a number; the k-th line of a panel.
+Line lineOf(const std::string& name, const Series& series, int k,
+            const std::function<double(const Row&)>& value);
 
 struct Panel {
   std::string x_label, y_label;

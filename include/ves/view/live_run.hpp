@@ -7,7 +7,6 @@
 #include <cmath>
 #include <deque>
 #include <future>
-#include <memory>
 #include <optional>
 #include <string>
 
@@ -21,7 +20,6 @@ class LiveRun : public LiveSource {
  public:
   /// Throws InputError when the bus cannot be opened.
   explicit LiveRun(const std::string& url);
-  ~LiveRun() override;
 
   int descriptor() noexcept { return bus_.descriptor(); }
   /// Takes in what has arrived; true when there is something new to show.

@@ -21,8 +21,8 @@ class Scene {
   explicit Scene(const Experiment& experiment);
 
   /// What stays: "name", "frames" (name and parent of each, in the order of a picture's poses),
-  /// "shapes" (kind, frame, sizes [m]), "arm" (the line of the arm at rest, in I [m]), "scalars"
-  /// (names), "phases", "segments", "checks".
+  /// "shapes" (kind, frame, sizes [m]), "arm" (the line of the arm at rest, in I [m]), "arm_radius"
+  /// [m], "scalars" (names), "phases", "segments", "checks".
   const nlohmann::ordered_json& description() const { return description_; }
   /// Meshes that are not drawn, and why.
   const std::vector<std::string>& warnings() const { return warnings_; }

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "ves/run/bus_recorder.hpp"
-
-#include <chrono>
+#include "ves/run/follow_bus.hpp"
 
 #include "ves/realtime/realtime.hpp"
 #include "ves/transport/bus.hpp"
@@ -36,9 +34,7 @@ bool followBus(const std::string& url, const std::function<bool()>& stop,
                   }
                   if (!described) return;
                   LogEvent event;
-                  event.time_us = std::chrono::duration_cast<std::chrono::microseconds>(
-                                      std::chrono::system_clock::now().time_since_epoch())
-                                      .count();
+                  event.time_us = wallNow() / 1000;
                   event.channel = from;
                   const auto* bytes = static_cast<const std::uint8_t*>(data);
                   event.data.assign(bytes, bytes + size);
