@@ -47,8 +47,17 @@ inline int allCores() {
   return static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
 }
 
-inline void addUrl(CLI::App& cli, std::string& url, const char* what = "LCM bus") {
+inline void addUrl(CLI::App& cli, std::string& url,
+                   const char* what = "LCM bus; &key=FILE: a key that signs its messages") {
   cli.add_option("--url", url, what)->capture_default_str();
+}
+
+/// For programs that meet on one private bus.
+inline void addJoin(CLI::App& cli, std::string& name) {
+  cli.add_option("--join", name, "on the private bus of this name; the first to ask begins it");
+}
+inline void joinIfNamed(const std::string& name) {
+  if (!name.empty()) joinPrivateBus(name);
 }
 
 inline void addWorkers(CLI::App& cli, int& workers, const std::string& what) {
@@ -87,6 +96,7 @@ struct Options {
   bool force = false;
   bool verbose = false, quiet = false;
   bool private_bus = false;
+  std::string join;
   ProcessOptions process;
 
   void addExperiment(CLI::App& cli) {
@@ -108,14 +118,27 @@ struct Options {
     addUrl(cli, process.url);
     cli.add_flag("--lockstep", process.lockstep, "as fast as possible, nothing waits on a clock");
     cli.add_flag("--realtime", process.realtime, "insist on SCHED_FIFO and locked memory");
-    cli.add_flag("--private-bus", private_bus, "on a network of this run's own");
+    auto* alone = cli.add_flag("--private-bus", private_bus, "on a network of this run's own");
+    addJoin(cli, join);
+    cli.get_option("--join")->excludes(alone);
+  }
+  /// Before any thread starts.
+  void enterBus() const {
+    if (private_bus) enterPrivateBus();
+    joinIfNamed(join);
   }
 
-  Experiment load() const {
+  /// The bus's key is the scenario's, unless --url names one.
+  Experiment load() {
     std::vector<std::string> all = overrides;
     if (seed >= 0) all.push_back(fmt::format("seed={}", seed));
     if (force) all.push_back("controller.stability=forced");
-    return loadExperiment(findScenario(scenario, configFolder()), all, calibration, masses, servo);
+    Experiment experiment =
+        loadExperiment(findScenario(scenario, configFolder()), all, calibration, masses, servo);
+    if (!experiment.key_file.empty() && BusAddress(process.url).key_file.empty())
+      process.url += (process.url.find('?') == std::string::npos ? "?key=" : "&key=") +
+                     experiment.key_file;
+    return experiment;
   }
 };
 

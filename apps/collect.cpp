@@ -49,7 +49,7 @@ int writeMcap(const std::string& log, const std::string& url, const std::string&
 int collectCommand(int argc, char** argv) {
   CLI::App cli("Takes variables out of a log, as CSV with the unit in every column's name.",
                "ves collect");
-  std::string log, out, mcap, url = kDefaultUrl;
+  std::string log, out, mcap, url = kDefaultUrl, join;
   bool follow = false;
   std::vector<std::string> select;
   bool list = false;
@@ -66,9 +66,11 @@ int collectCommand(int argc, char** argv) {
   cli.add_option("--mcap", mcap, "everything into this MCAP file for Foxglove, PlotJuggler, Rerun");
   cli.add_flag("--follow", follow, "the run on the bus instead of a log, with --mcap");
   addUrl(cli, url, "LCM bus, with --follow");
+  addJoin(cli, join);
   return run(cli, argc, argv, [&] {
     if (follow == !log.empty() || (follow && mcap.empty()))
       throw InputError("want a log, or --follow with --mcap FILE");
+    joinIfNamed(join);
     if (!mcap.empty()) return writeMcap(log, url, mcap);
     const Series series = readSeries(log);
     printDamage(series.damage);

@@ -14,6 +14,8 @@ int conformCommand(int argc, char** argv);
 int doctorCommand(int argc, char** argv);
 int faultsCommand(int argc, char** argv);
 int identifyCommand(int argc, char** argv);
+int netftServerCommand(int argc, char** argv);
+int onBusCommand(int argc, char** argv);
 int plantCommand(int argc, char** argv);
 int plotCommand(int argc, char** argv);
 int replayCommand(int argc, char** argv);

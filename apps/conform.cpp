@@ -59,6 +59,7 @@ int conformCommand(int argc, char** argv) {
   double seconds = 3.0;
   options.addExperiment(cli);
   addUrl(cli, options.process.url);
+  addJoin(cli, options.join);
   cli.add_option("--seconds", seconds, "to listen")
       ->check(inRange(0.5, 3600.0))
       ->capture_default_str();
@@ -67,6 +68,7 @@ int conformCommand(int argc, char** argv) {
     options.overrides.push_back(
         "program=[{move: {}}, {move: {to: {z_m: 0.02}, duration_s: 2}}, {move: {}}]");
     const Experiment experiment = options.load();
+    options.enterBus();
     catchSignals();
     fmt::print(stderr, "listening on {} for {:g} s\n", options.process.url, seconds);
     std::vector<Requirement> all = listen(experiment, options.process.url, seconds);

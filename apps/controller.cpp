@@ -18,7 +18,7 @@ struct ControllerOptions : RunnerOptions {
 
 /// One process, no terminal.
 int serve(ControllerOptions& options) {
-  if (options.private_bus) enterPrivateBus();
+  options.enterBus();
   catchSignals();
   Experiment experiment = options.load();
   if (options.process.start) {

@@ -164,7 +164,7 @@ int servo(const std::string& log, const std::string& file) {
   return keep(file, yaml, readServo);
 }
 
-int iterate(const Options& load, const IterativeOptions& options, const std::string& file) {
+int iterate(Options& load, const IterativeOptions& options, const std::string& file) {
   const Experiment e = load.load();
   printWarnings(e);
   fmt::print("{:>9} {:>22} {:>22}\n", "iteration", "answer - path [mm]", "[deg]");

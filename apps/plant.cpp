@@ -7,15 +7,17 @@
 namespace ves::app {
 
 int plantCommand(int argc, char** argv) {
-  CLI::App cli("The plant as a process: legs, platform, robot, sensor. Runs until Ctrl-C.",
+  CLI::App cli("The machine as a process: legs, platform, robot, sensor; simulated, or as the scenario's "
+      "`machine` says. Runs until Ctrl-C.",
                "ves plant");
   Options options;
   options.addExperiment(cli);
   options.addBus(cli);
   return run(cli, argc, argv, [&] {
-    if (options.private_bus) enterPrivateBus();
+    const Experiment experiment = options.load();
+    options.enterBus();
     catchSignals();
-    runPlant(options.load(), options.process, [] { return stop_requested != 0; });
+    runPlant(experiment, options.process, [] { return stop_requested != 0; });
     return kDone;
   });
 }

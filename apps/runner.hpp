@@ -59,11 +59,11 @@ inline LaunchOptions prepareFolder(RunnerOptions& options, const Experiment& exp
 
 /// A bus that works; `alone`: nobody else needs to be on it.
 inline void prepareBus(RunnerOptions& options, bool alone) {
-  if (alone && !options.private_bus && !busWorks(options.process.url)) {
+  if (alone && !options.private_bus && options.join.empty() && !busWorks(options.process.url)) {
     fmt::print(stderr, "multicast does not come back on this machine: using a private bus\n");
     options.private_bus = true;
   }
-  if (options.private_bus) enterPrivateBus();
+  options.enterBus();
   // Asked here first, so that a refusal is said once.
   if (options.process.realtime) claimRealtime(kRecorderPriority, true);
 }

@@ -36,6 +36,8 @@ constexpr Command kCommands[] = {
      faultsCommand},
     {"robot", "what a robot description holds, and what of it moves", robotCommand},
     {"conform", "does the machine on the bus keep its side of it", conformCommand},
+    {"on-bus", "any program on a private bus that --join reaches", onBusCommand},
+    {"netft-server", "the simulated force sensor as an ATI Net F/T", netftServerCommand},
     {"doctor", "can this machine keep the loop's time, and what to do where it cannot",
      doctorCommand},
 };

@@ -15,7 +15,7 @@ struct ViewOptions {
   std::vector<std::string> logs;
   std::string html;
   std::optional<double> rate;
-  std::string url = kDefaultUrl, address = "127.0.0.1";
+  std::string url = kDefaultUrl, join, address = "127.0.0.1";
   std::optional<int> port;
   int listener = -1;
 };
@@ -48,6 +48,7 @@ int servePage(const ViewOptions& options) {
   const char* token = std::getenv(kViewToken);
   const Listener listener = inherited ? inheritedListener(options.listener, token ? token : "")
                                       : listenOn(options.address, options.port);
+  joinIfNamed(options.join);  // browsers are outside of it
   std::optional<LiveRun> live;
   if (options.logs.empty()) live.emplace(options.url);
   WebServer server(listener,
@@ -95,6 +96,7 @@ int viewCommand(int argc, char** argv) {
                  "[1/s] pictures of a log; 60 in a file, every tick in a browser")
       ->check(inRange(0.1, 1000.0));
   addUrl(cli, options.url);
+  addJoin(cli, options.join);
   cli.add_option("--port", options.port, "8780 by default, or a free one where that is taken")
       ->check(CLI::Range(0, 65535));
   cli.add_option("--bind", options.address, "address of this machine that browsers connect to")

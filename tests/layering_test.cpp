@@ -38,8 +38,9 @@ const std::map<std::string, Names> kMayInclude = [] {
   add("config", {"srms"}, "analysis");
   add("identification", {}, "config");
   add("realtime", {}, "base");
-  add("transport", {"simulation"}, "config");
-  add("run", {"realtime"}, "transport");
+  add("transport", {"simulation", "realtime"}, "config");
+  add("devices", {}, "transport");
+  add("run", {}, "devices");
   add("results", {"identification"}, "run");
   add("view", {}, "results");
   add("validation", {}, "view");

@@ -158,7 +158,7 @@ TEST(Ros2, ADefinitionKeepsUnitsAndOrder) {
 
 TEST(Ros2, BytesAreTurnedAndAligned) {
   std::vector<std::uint8_t> lcm(8, 0xaa);  // fingerprint
-  for (int i = 0; i < 4; ++i)              // header: 1, 2, 3, 4
+  for (int i = 0; i < 6; ++i)              // header: 1 to 6
     for (int k = 0; k < 8; ++k) lcm.push_back(k == 7 ? static_cast<std::uint8_t>(i + 1) : 0);
   lcm.push_back(0xfe);  // -2
   for (const int byte : {0x3f, 0xf0, 0, 0, 0, 0, 0, 0})
@@ -167,14 +167,14 @@ TEST(Ros2, BytesAreTurnedAndAligned) {
     lcm.push_back(static_cast<std::uint8_t>(byte));                                    // -2.0
   for (const int byte : {0, 0, 1, 0}) lcm.push_back(static_cast<std::uint8_t>(byte));  // 256
   const std::string cdr = LcmDefinition(kLcm).cdr(lcm);
-  ASSERT_EQ(cdr.size(), 4u + 32u + 8u + 16u + 4u);
+  ASSERT_EQ(cdr.size(), 4u + 48u + 8u + 16u + 4u);
   EXPECT_EQ(cdr.substr(0, 4), std::string("\0\1\0\0", 4));
-  for (std::size_t i = 0; i < 4; ++i)
+  for (std::size_t i = 0; i < 6; ++i)
     EXPECT_EQ(number<std::int64_t>(cdr, 4 + 8 * i), static_cast<std::int64_t>(i + 1));
-  EXPECT_EQ(number<std::int8_t>(cdr, 36), -2);
-  EXPECT_EQ(number<double>(cdr, 44), 1.0);  // seven bytes of padding
-  EXPECT_EQ(number<double>(cdr, 52), -2.0);
-  EXPECT_EQ(number<std::int32_t>(cdr, 60), 256);
+  EXPECT_EQ(number<std::int8_t>(cdr, 52), -2);
+  EXPECT_EQ(number<double>(cdr, 60), 1.0);  // seven bytes of padding
+  EXPECT_EQ(number<double>(cdr, 68), -2.0);
+  EXPECT_EQ(number<std::int32_t>(cdr, 76), 256);
   lcm.push_back(0);
   EXPECT_EQ(LcmDefinition(kLcm).cdr(lcm), "");
   lcm.resize(20);

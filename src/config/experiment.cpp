@@ -94,6 +94,12 @@ Experiment build(const Value& document) {
   watchdog.finish();
   const Legs legs = readLegs(leg_section);
   c.legs = legs.codec;
+  out.machine = readMachine(root.section("machine"));
+  if (root.has("bus")) {
+    Section bus = root.section("bus");
+    out.key_file = bus.text("key_file");
+    bus.finish();
+  }
   const Sensor sensor = readSensor(root.section("sensor"));
   c.sensor = {sensor.model.S_proc().inverse(), sensor.X_PS};
   c.stillness.bias /= sensor.model.volts_per_count;

@@ -68,6 +68,29 @@ Sensor readSensor(Section s) {
   return out;
 }
 
+MachineConfig readMachine(Section s) {
+  MachineConfig m;
+  const auto external = [&](const char* key) {
+    return s.choice(key, {"simulated", "external"}) == "external" ? Source::kExternal
+                                                                  : Source::kSimulated;
+  };
+  m.legs = external("legs");
+  m.robot = external("robot");
+  m.switches = external("switches");
+  const std::string sensor = s.choice("force_sensor", {"simulated", "external", "net_ft"});
+  m.force_sensor = sensor == "net_ft"     ? Source::kNetFt
+                   : sensor == "external" ? Source::kExternal
+                                          : Source::kSimulated;
+  Section net_ft = s.section("net_ft");
+  m.net_ft.host = net_ft.text("host");
+  m.net_ft.port = static_cast<int>(net_ft.integer("port", 1, 65535));
+  m.net_ft.http_port = static_cast<int>(net_ft.integer("http_port", 1, 65535));
+  net_ft.finish();
+  m.follow = s.number("follow_per_s", 1.0, 1e4);
+  s.finish();
+  return m;
+}
+
 /// What the machine is, beside what everybody believes: factors on the robot's masses, on its
 /// links' centres of mass, and on the servos.
 void readPlantMismatch(Section s, plant::PlantConfig& p) {

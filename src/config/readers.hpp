@@ -69,6 +69,9 @@ void readController(Section s, ControllerConfig& c);
 /// program, with the events of robot and faults; `out` has the machine and the robot already
 void readProgram(Section& root, Experiment& out);
 
+/// machine
+MachineConfig readMachine(Section s);
+
 /// plant_mismatch
 void readPlantMismatch(Section s, plant::PlantConfig& p);
 

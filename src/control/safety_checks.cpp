@@ -12,6 +12,7 @@ std::string_view name(Check check) noexcept {
     case Check::kFloorMat: return "floor mat";
     case Check::kFinite: return "finite numbers";
     case Check::kStale: return "sample age";
+    case Check::kDevice: return "device fault";
     case Check::kOverrun: return "tick overrun";
     case Check::kLegReading: return "leg reading";
     case Check::kForwardKinematics: return "forward kinematics";
@@ -36,6 +37,7 @@ std::string_view name(Check check) noexcept {
 bool freezes(Check check) noexcept {
   switch (check) {
     case Check::kStale:
+    case Check::kDevice:
     case Check::kOverrun:
     case Check::kPressure:
     case Check::kSensorSaturated:
@@ -71,6 +73,10 @@ bool positionErrorCheck(const SafetyLimits& limits, const Vec6& L_expected, cons
            error <= limits.position_error_still + limits.position_error_lag * speed(i);
   }
   return near;
+}
+
+bool pieceAgeCheck(const SafetyLimits& limits, const Sample& sample, double period) noexcept {
+  return static_cast<double>(sample.oldest()) * kSecondPerNanosecond <= limits.stale_ticks * period;
 }
 
 bool pressureCheck(const SafetyLimits& limits, const AdcCounts& adc) noexcept {

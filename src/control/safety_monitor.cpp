@@ -25,7 +25,9 @@ Tripped SafetyMonitor::check(const Proposal& p, const LegContext& context,
   t.require(Check::kFinite, p.x.x.allFinite() && p.x.x_dot.allFinite() && p.x.x_ddot.allFinite() &&
                                 p.legs.L.allFinite() && sample.q.allFinite() &&
                                 dynamic.stacked().allFinite());
-  t.require(Check::kStale, sample.sequence >= 0 && samples.age() <= limits.stale_ticks);
+  t.require(Check::kStale, sample.sequence >= 0 && samples.age() <= limits.stale_ticks &&
+                               pieceAgeCheck(limits, sample, period_));
+  t.require(Check::kDevice, sample.faults == 0);
   t.require(Check::kOverrun, overruns_.good(limits, std::llround(1.0 / period_)));
   t.require(Check::kLegReading, legs.readings().good());
   t.require(Check::kForwardKinematics, m.solved);

@@ -44,7 +44,7 @@ FaultOutcome refusals(const Tries& tries) {
 
 FaultOutcome hostileStrings(const fs::path& config) {
   const Bytes good = encoded(describe(faultScenario(config, "puma_on_table_4_1", {}), {1, 2}, 0));
-  constexpr std::size_t kFirstLength = 44;  // [B] after fingerprint, header and schema
+  constexpr std::size_t kFirstLength = 60;  // [B] after fingerprint, header and schema
   int taken = 0, tries = 0;
   for (const std::uint32_t length : {0x7fffffffu, 0xffffffffu, 0u, 0x40000000u}) {
     Bytes bad = good;

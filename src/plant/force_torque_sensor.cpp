@@ -4,11 +4,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include <Eigen/LU>
+
 namespace ves::plant {
 
 ForceTorqueSensor::ForceTorqueSensor(const ForceTorqueSensorModel& model, Noise noise) noexcept
     : model_(model),
       volts_per_newton_(model.S_proc() * model.volts_per_count),
+      newtons_per_volt_(volts_per_newton_.inverse()),
       noise_gain_((model.gain.cwiseProduct(model.noise)).array()),
       noisy_(!model.noise.isZero(0.0)),
       filter_(model.cutoff),
@@ -28,6 +31,11 @@ void ForceTorqueSensor::advance(const Step& step, const Wrench& F_So_S, Over ove
     for (int i = 0; i < kWrenchChannels; ++i) held(i) = noise_gain_(i) * root * noise_.normal();
   }
   filter_.advance(step, volts, held);
+}
+
+Wrench ForceTorqueSensor::reading(double warmer) const noexcept {
+  const Vec6 volts = filter_.output().matrix() + model_.bias + model_.drift * warmer;
+  return Wrench::from(newtons_per_volt_ * volts);
 }
 
 AdcCounts ForceTorqueSensor::convert(double warmer) const noexcept {

@@ -199,6 +199,7 @@ Wrench Plant::sensorLoad() const noexcept {
 }
 
 LegMotion Plant::legOutputs(double dt) noexcept {
+  if (real_legs_) return truth_.legs = *real_legs_;
   LegMotion out;
   for (int i = 0; i < kLegs; ++i) {
     const Actuator& actuator = actuators_[static_cast<std::size_t>(i)];
@@ -234,7 +235,7 @@ void Plant::stepMechanics() noexcept {
   guess.R = rotationOf(dt * truth_.P.w) * guess.R;
   const ForwardSolution forward = forwardPose(config_.geometry, legs.L, guess);
   truth_.legs_agree = forward.ok() && forwardMotion(config_.geometry, forward.X_IP, legs, truth_.P);
-  truth_.joints = robot_.at(now_);
+  truth_.joints = real_joints_ ? *real_joints_ : robot_.at(now_);
 
   const Wrench F_So_S = sensorLoad();
   // Behind Filter 3 the acceleration is smooth again, and known at the end of the step.
@@ -250,9 +251,11 @@ Sample Plant::sample() noexcept {
   truth_.x = config_.geometry.toHome(truth_.P.X);
   Sample s;
   s.sequence = ++sequence_;
-  s.time = now_;
+  s.time = s.legs_time = s.wrench_time = s.joints_time = now_;
   s.temperature = config_.climate.at(seconds(now_));
-  s.adc = sensor_.convert(s.temperature - config_.climate.mean);
+  const double warmer = s.temperature - config_.climate.mean;
+  s.adc = sensor_.convert(warmer);
+  truth_.F_So_S = sensor_.reading(warmer);
   for (std::size_t i = 0; i < kLegs; ++i) {
     s.legs[i] = config_.transducer.count(actuators_[i].length());
     truth_.current(static_cast<Eigen::Index>(i)) = slaves_[i].current();

@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/simulation/lockstep.hpp"
+
+#include <fmt/format.h>
+
 #include "ves/base/build.hpp"
 #include "ves/realtime/realtime.hpp"
 #include "ves/run/run.hpp"
@@ -19,8 +22,16 @@ experiment_t describe(const Experiment& experiment, const Identity& from, std::i
   return m;
 }
 
+void requireSimulated(const Experiment& experiment) {
+  if (experiment.machine.simulated()) return;
+  throw InputError(fmt::format(
+      "{}: a machine with real pieces runs in real time; lockstep wants `machine` all simulated",
+      experiment.name));
+}
+
 RunResult runRecorded(const Experiment& experiment, RunRecorder* recorder, const Watch& watch,
                       Request first) {
+  requireSimulated(experiment);
   const Identity controller{1, 0}, machine{2, 0};
   Lockstep loop(experiment.controller, experiment.plant);
   RunMonitor monitor(experiment.controller);

@@ -155,7 +155,7 @@ class Replayer {
     note(recorded, toMessage(state, in, recorded.header));
     replayed_commands_.put(in.tick, toMessage(state.command, recorded.header));
     if (const auto* command = recorded_commands_.find(in.tick))
-      note(*command, *replayed_commands_.find(in.tick));
+      noteCommand(*command, *replayed_commands_.find(in.tick));
     result_.pose_difference =
         result_.pose_difference.cwiseMax((state.motion.x - Vec6::Map(recorded.x)).cwiseAbs());
     result_.phase = state.phase;
@@ -168,9 +168,16 @@ class Replayer {
     const auto recorded = decoded<leg_command_t>();
     if (result_.ticks > 0 && recorded.header.source != controller_) return;
     if (const auto* replayed = replayed_commands_.find(recorded.header.sequence))
-      note(recorded, *replayed);
+      noteCommand(recorded, *replayed);
     else
       recorded_commands_.put(recorded.header.sequence, recorded);
+  }
+
+  /// Which machine a command is for, and its signature, are no part of the tick.
+  void noteCommand(const leg_command_t& recorded, leg_command_t replayed) {
+    replayed.header = recorded.header;
+    replayed.machine = recorded.machine;
+    note(recorded, replayed);
   }
 
   template <typename Message>

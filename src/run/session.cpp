@@ -59,6 +59,7 @@ void Session::receive(const std::string& channel, const void* data, std::uint32_
                  stderr);
   }
   if (on_message_) on_message_(channel, data, size);
+  if (channel == channel::kSample) machine_ = decode<sample_t>(data, size)->header.source;
   if (channel != channel::kState) return;
   const auto state = decode<state_t>(data, size);
   if (!state || state->header.sequence < 0 || state->header.sequence > kMaxSequence) return;
@@ -112,7 +113,9 @@ std::optional<Refusal> Session::order(const Order& order) {
 }
 
 void Session::orderRobot(const RobotOrder& order) {
-  bus_.publish(channel::kRobot, toMessage(order, header(self_, orders_++, monotonicNow())));
+  robot_command_t message = toMessage(order, header(self_, orders_++, monotonicNow()));
+  message.machine = machine_;
+  bus_.publish(channel::kRobot, message);
 }
 
 void Session::interrupt() {

@@ -13,6 +13,9 @@ bool plausible(const Sample& s) noexcept {
   for (const std::int32_t count : s.legs)
     good = good && count >= 0 && count <= plant::Temposonics::kMaxCount;
   for (const double q : s.q) good = good && q >= -kMaxJointValue && q <= kMaxJointValue;
+  for (const std::int64_t t : {s.legs_time, s.wrench_time, s.joints_time})
+    good = good && t >= 0 && t <= s.time;
+  good = good && s.faults <= kAllPieces;
   return good && s.temperature >= kColdest && s.temperature <= kHottest;
 }
 

@@ -10,6 +10,7 @@
 #include <cstdio>
 
 #include "ves/base/errors.hpp"
+#include "ves/realtime/realtime.hpp"
 #include "ves/transport/channels.hpp"
 
 namespace ves {
@@ -17,19 +18,6 @@ namespace {
 
 // Ten samples wait at each tick in the worst case; a stalled controller must still find the newest.
 constexpr int kQueue = 4096;  // [-] messages
-
-/// Refuses what LCM would print about, or take part of an address from.
-void check(const std::string& url) {
-  unsigned a, b, c, d, port;
-  int end = 0;
-  const int read =
-      std::sscanf(url.c_str(), "udpm://%3u.%3u.%3u.%3u:%5u%n", &a, &b, &c, &d, &port, &end);
-  const std::string rest = url.substr(static_cast<std::size_t>(end));
-  if (read != 5 || end == 0 || a < 224 || a > 239 || b > 255 || c > 255 || d > 255 || port < 1 ||
-      port > 65535 || !(rest.empty() || rest.rfind("?ttl=", 0) == 0))
-    throw InputError(fmt::format(
-        "--url {}: want udpm://MULTICAST-ADDRESS:PORT[?ttl=N], for example {}", url, kDefaultUrl));
-}
 
 /// True when the kernel knows where multicast should go; LCM prints a page when it does not.
 bool hasRoute() {
@@ -51,10 +39,9 @@ bool hasRoute() {
       url));
 }
 
-const std::string& reachable(const std::string& url) {
-  check(url);
-  if (!hasRoute()) refuse(url);
-  return url;
+const std::string& reachable(const BusAddress& address) {
+  if (!hasRoute()) refuse(address.lcm);
+  return address.lcm;
 }
 
 /// One message to ourselves, within two seconds.
@@ -76,17 +63,84 @@ bool echoes(lcm::LCM& lcm) {
 
 }  // namespace
 
-Bus::Bus(const std::string& url) : lcm_(reachable(url)) {
+BusAddress::BusAddress(const std::string& url) {
+  // LCM would print about what it does not understand, or take part of an address.
+  unsigned a, b, c, d, port;
+  int end = 0;
+  const int read =
+      std::sscanf(url.c_str(), "udpm://%3u.%3u.%3u.%3u:%5u%n", &a, &b, &c, &d, &port, &end);
+  bool good = read == 5 && a >= 224 && a <= 239 && b < 256 && c < 256 && d < 256 && port > 0 &&
+              port < 65536;
+  std::string rest = url.substr(static_cast<std::size_t>(end));
+  lcm = url.substr(0, static_cast<std::size_t>(end));
+  for (char lead = '?'; good && !rest.empty(); lead = '&') {
+    const std::size_t next = std::min(rest.find('&', 1), rest.size());
+    const std::string option = rest.substr(0, next);
+    int taken = 0;
+    if (option.rfind(lead + std::string("key="), 0) == 0 && option.size() > 5)
+      key_file = option.substr(5);
+    else
+      good = option[0] == lead && std::sscanf(option.c_str() + 1, "ttl=%3d%n", &ttl, &taken) == 1 &&
+             static_cast<std::size_t>(taken) + 1 == option.size() && ttl >= 0 && ttl < 256;
+    rest.erase(0, next);
+  }
+  if (!good)
+    throw InputError(fmt::format(
+        "--url {}: want udpm://MULTICAST-ADDRESS:PORT[?ttl=N][&key=FILE], for example {}", url,
+        kDefaultUrl));
+  lcm += fmt::format("?ttl={}", ttl);
+}
+
+std::string openBusWarning(const std::string& url) {
+  const BusAddress address(url);
+  if (address.ttl == 0 || !address.key_file.empty()) return {};
+  return fmt::format(
+      "{}: anybody in reach can command the legs; &key=FILE has messages signed (docs/machine.md)",
+      url);
+}
+
+Bus::Bus(const std::string& url) : address_(url), lcm_(reachable(address_)) {
+  if (!address_.key_file.empty()) key_.emplace(address_.key_file);
   if (!lcm_.good()) throw InputError(fmt::format("--url {}: not a bus that LCM can open", url));
   if (!echoes(lcm_)) refuse(url);
 }
 
 void Bus::publish(const std::string& channel, const experiment_t& message) {
-  lcm_.publish(channel, &message);
+  std::vector<std::uint8_t> bytes(static_cast<std::size_t>(message.getEncodedSize()));
+  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  send(channel, bytes.data(), bytes.size());
+}
+
+void Bus::send(const std::string& channel, std::uint8_t* message, std::size_t size) noexcept {
+  if (key_) key_->sign(channel, message, size);
+  if (lcm_.publish(channel, message, static_cast<unsigned>(size)) != 0) ++failed_;
+}
+
+/// Signed, and not heard before; anything on a bus without a key.
+bool Bus::lets(const std::string& channel, const void* message, std::size_t size) noexcept {
+  if (!key_) return true;
+  const auto* bytes = static_cast<const std::uint8_t*>(message);
+  if (!key_->signedBy(channel, bytes, size)) {
+    ++refused_.forged;
+    return false;
+  }
+  if (!guard_.fresh(channel, bytes)) {
+    ++refused_.replayed;
+    return false;
+  }
+  return true;
+}
+
+void Bus::Subscriber::receive(const lcm::ReceiveBuffer* buffer, const std::string& channel) {
+  if (!bus.lets(channel, buffer->data, buffer->data_size)) return;
+  const std::int64_t waited = wallNow() - buffer->recv_utime * 1000;
+  constexpr std::int64_t kLongest = 10'000'000'000;  // [ns]; more: somebody set the wall clock
+  bus.arrival_ = monotonicNow() - (waited > 0 && waited < kLongest ? waited : 0);
+  handler(channel, buffer->data, buffer->data_size);
 }
 
 void Bus::subscribe(const std::string& channel, Handler handler) {
-  subscribers_.push_back(std::make_unique<Subscriber>(Subscriber{std::move(handler)}));
+  subscribers_.push_back(std::make_unique<Subscriber>(Subscriber{*this, std::move(handler)}));
   lcm_.subscribe(channel, &Subscriber::receive, subscribers_.back().get())
       ->setQueueCapacity(kQueue);
 }
@@ -99,10 +153,16 @@ void Bus::drain() noexcept {
 bool Bus::wait(int milliseconds) noexcept { return lcm_.handleTimeout(milliseconds) > 0; }
 
 bool busWorks(const std::string& url) {
-  check(url);
+  const BusAddress address(url);
   if (!hasRoute()) return false;
-  lcm::LCM lcm(url);
+  lcm::LCM lcm(address.lcm);
   return lcm.good() && echoes(lcm);
+}
+
+std::string Refused::text() const {
+  if (forged + replayed == 0) return {};
+  return fmt::format("{} messages ignored that are not signed with the bus's key, {} heard before",
+                     forged, replayed);
 }
 
 std::string Rejections::text() const {
@@ -118,25 +178,7 @@ std::string Rejections::text() const {
 
 ControllerLink::ControllerLink(Bus& bus, const Identity& self) : bus_(bus), self_(self) {
   bus.subscribe(channel::kSample, [this](const std::string&, const void* data, std::uint32_t size) {
-    const auto message = decode<sample_t>(data, size);
-    const auto sample = message ? fromMessage(*message) : std::nullopt;
-    const bool same =
-        message && message->header.source == plant_.source && message->header.epoch == plant_.epoch;
-    const bool renewed = message && !same && !engaged_ && message->header.epoch > plant_.epoch;
-    if (sample && !same && !renewed) conflict_ = true;
-    const bool newer = same && sample && sample->sequence >= sample_.sequence;
-    if (!sample || !(renewed || newer)) {
-      ++rejected_;
-      ++(!message  ? samples_rejected_.malformed
-         : !sample ? samples_rejected_.out_of_range
-         : !same   ? samples_rejected_.of_another
-                   : samples_rejected_.old);
-      return;
-    }
-    plant_ = {message->header.source, message->header.epoch};
-    sample_ = *sample;
-    answers_ = message->answers;
-    sample_time_ = message->header.time_ns;
+    receiveSample(data, size);
   });
   bus.subscribe(channel::kLegCommand,
                 [this](const std::string&, const void* data, std::uint32_t size) {
@@ -152,6 +194,36 @@ ControllerLink::ControllerLink(Bus& bus, const Identity& self) : bus_(bus), self
                   else
                     ++rejected_;
                 });
+}
+
+void ControllerLink::receiveSample(const void* data, std::uint32_t size) noexcept {
+  const auto message = decode<sample_t>(data, size);
+  const auto sample = message ? fromMessage(*message) : std::nullopt;
+  const bool same =
+      message && message->header.source == plant_.source && message->header.epoch == plant_.epoch;
+  const bool answers_us = message && message->command_source == self_.source;
+  const bool alive = answers_us || !bus_.keyed();
+  const bool renewed =
+      message && !same && !engaged_ && alive && message->header.epoch > plant_.epoch;
+  if (sample && !same && !renewed && alive) conflict_ = true;
+  const bool newer = same && sample && sample->sequence >= sample_.sequence;
+  if (!sample || !(renewed || newer)) {
+    ++rejected_;
+    ++(!message  ? samples_rejected_.malformed
+       : !sample ? samples_rejected_.out_of_range
+       : !same   ? samples_rejected_.of_another
+                 : samples_rejected_.old);
+    return;
+  }
+  if (!same) clock_ = ClockOffset();
+  plant_ = {message->header.source, message->header.epoch};
+  sample_ = *sample;
+  answers_ = message->answers;
+  sample_time_ = message->header.time_ns;
+  if (!answers_us || message->command_sequence < -1) return;
+  const Sent& sent = sent_[static_cast<std::size_t>(message->command_sequence + 1) % sent_.size()];
+  if (sent.sequence == message->command_sequence)
+    clock_.take(sent.time, message->command_time_ns, sample_time_, bus_.arrival());
 }
 
 void ControllerLink::receiveOrder(const operator_t& message) noexcept {
@@ -179,17 +251,20 @@ Order ControllerLink::takeOrder() noexcept {
   return oldest;
 }
 
-void ControllerLink::send(const leg_command_t& command) noexcept {
+void ControllerLink::send(leg_command_t command) noexcept {
   engaged_ = command.engaged != 0;
+  command.machine = plant_.source;
+  const std::int64_t sequence = command.header.sequence;
+  sent_[static_cast<std::size_t>(sequence + 1) % sent_.size()] = {sequence, monotonicNow()};
   bus_.publish(channel::kLegCommand, command);
 }
 
-PlantLink::PlantLink(Bus& bus) {
+PlantLink::PlantLink(Bus& bus, const Identity& self) : bus_(bus), self_(self) {
   bus.subscribe(channel::kLegCommand,
                 [this](const std::string&, const void* data, std::uint32_t size) {
                   const auto message = decode<leg_command_t>(data, size);
                   const auto command = message ? fromMessage(*message) : std::nullopt;
-                  if (!command || !mayCommand(message->header, command->engaged)) {
+                  if (!command || !mayCommand(message->header, message->machine, command->engaged)) {
                     ++rejected_;
                     return;
                   }
@@ -198,7 +273,7 @@ PlantLink::PlantLink(Bus& bus) {
   bus.subscribe(channel::kRobot, [this](const std::string&, const void* data, std::uint32_t size) {
     const auto message = decode<robot_command_t>(data, size);
     const auto order = message ? fromMessage(*message) : std::nullopt;
-    if (!order) {
+    if (!order || !means(message->machine)) {
       ++rejected_;
       return;
     }
@@ -206,17 +281,25 @@ PlantLink::PlantLink(Bus& bus) {
   });
 }
 
-bool PlantLink::mayCommand(const header_t& from, bool engaged) noexcept {
+/// A command for this machine. Without a key one that names none is for everybody.
+bool PlantLink::means(std::int64_t machine) const noexcept {
+  return machine == self_.source || (machine == 0 && !bus_.keyed());
+}
+
+bool PlantLink::mayCommand(const header_t& from, std::int64_t machine, bool engaged) noexcept {
   const bool master = from.source == master_.source && from.epoch == master_.epoch;
   if (!master) {
     // Others wait until the master lets go or falls silent. A controller that is not engaged asks
     // for nothing, and takes nothing over from one that is.
     if (engaged_ && now_ - heard_ < kSilence) return false;
+    last_heard_ = {from.source, from.sequence, bus_.arrival()};  // who says hello, and does not know us
+    if (!means(machine)) return false;
     if (from.epoch < master_.epoch) return false;  // a ghost: a log played, a process left behind
     master_ = {from.source, from.epoch};
     sequence_ = -2;
   }
-  if (from.sequence < sequence_) return false;
+  if (from.sequence < sequence_ || !means(machine)) return false;
+  last_heard_ = {from.source, from.sequence, bus_.arrival()};
   sequence_ = from.sequence;
   engaged_ = engaged;
   heard_ = now_;

@@ -53,7 +53,7 @@ Identity Identity::draw() {
 }
 
 header_t header(const Identity& from, std::int64_t sequence, std::int64_t time) noexcept {
-  header_t h;
+  header_t h{};
   h.time_ns = time;
   h.sequence = sequence;
   h.source = from.source;
@@ -62,7 +62,7 @@ header_t header(const Identity& from, std::int64_t sequence, std::int64_t time) 
 }
 
 sample_t toMessage(const Sample& sample, const Identity& from, std::int64_t answers) noexcept {
-  sample_t m;
+  sample_t m{};
   m.header = header(from, sample.sequence, sample.time);
   m.answers = answers;
   std::copy(sample.adc.begin(), sample.adc.end(), m.adc);
@@ -70,11 +70,15 @@ sample_t toMessage(const Sample& sample, const Identity& from, std::int64_t answ
   m.switches = static_cast<std::int32_t>(sample.switches);
   put(sample.q, m.q);
   m.temperature = sample.temperature;
+  m.legs_time_ns = sample.legs_time;
+  m.wrench_time_ns = sample.wrench_time;
+  m.joints_time_ns = sample.joints_time;
+  m.faults = static_cast<std::int32_t>(sample.faults);
   return m;
 }
 
 leg_command_t toMessage(const LegCommand& command, const header_t& header) noexcept {
-  leg_command_t m;
+  leg_command_t m{};
   m.header = header;
   m.engaged = command.engaged ? 1 : 0;
   m.segment = command.segment;
@@ -163,6 +167,7 @@ truth_t toMessage(const plant::Truth& truth, const header_t& header) noexcept {
   put(truth.P.a, m.a);
   put(truth.P.alpha, m.alpha);
   put(truth.F_Po_I.stacked(), m.wrench);
+  put(truth.F_So_S.stacked(), m.sensor);
   put(truth.joints.q, m.q);
   put(truth.joints.q_dot, m.q_dot);
   put(truth.joints.q_ddot, m.q_ddot);
@@ -240,7 +245,7 @@ setup_t setupOf(const Experiment& e, bool lockstep, const header_t& header) {
 
 template <>
 std::optional<experiment_t> decode<experiment_t>(const void* data, std::int64_t size) {
-  constexpr std::int64_t kFixed = 8 + 32 + 4;  // [B] fingerprint, header_t, schema
+  constexpr std::int64_t kFixed = 8 + 48 + 4;  // [B] fingerprint, header_t, schema
   constexpr int kStrings = 4;                  // name, hash, version, resolved
   const auto* bytes = static_cast<const std::uint8_t*>(data);
   if (size < kFixed || size > INT32_MAX) return {};
@@ -279,6 +284,11 @@ std::optional<Sample> fromMessage(const sample_t& m) noexcept {
   s.q = JointVector::Map(m.q);
   s.switches = static_cast<std::uint32_t>(m.switches) & kAllSwitchesClosed;
   s.temperature = m.temperature;
+  const auto stamp = [&](std::int64_t t) { return t == 0 ? s.time : t; };
+  s.legs_time = stamp(m.legs_time_ns);
+  s.wrench_time = stamp(m.wrench_time_ns);
+  s.joints_time = stamp(m.joints_time_ns);
+  s.faults = static_cast<std::uint32_t>(m.faults);
   if (!plausible(s)) return {};
   return s;
 }

@@ -5,11 +5,14 @@
 #include <net/if.h>
 #include <net/route.h>
 #include <sched.h>
+#include <sys/file.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
 
@@ -18,6 +21,36 @@
 
 namespace ves {
 namespace {
+
+/// An open file that goes with its scope.
+struct File {
+  int descriptor = -1;
+  File(const std::string& name, int flags) : descriptor(open(name.c_str(), flags | O_CLOEXEC, 0600)) {}
+  ~File() {
+    if (descriptor >= 0) close(descriptor);
+  }
+  File(const File&) = delete;
+  File& operator=(const File&) = delete;
+};
+
+/// Tells networks apart; 0: no such process.
+ino_t networkOf(const std::string& process) {
+  struct stat info {};
+  return stat(("/proc/" + process + "/ns/net").c_str(), &info) == 0 ? info.st_ino : 0;
+}
+
+/// Who is on which private bus is kept here, for this user alone.
+std::string registry() {
+  const char* runtime = std::getenv("XDG_RUNTIME_DIR");
+  const std::string folder =
+      runtime && *runtime ? std::string(runtime) + "/ves" : fmt::format("/tmp/ves-{}", geteuid());
+  struct stat info {};
+  const bool made = mkdir(folder.c_str(), 0700) == 0 || errno == EEXIST;
+  if (!made || lstat(folder.c_str(), &info) != 0 || !S_ISDIR(info.st_mode) ||
+      info.st_uid != geteuid() || (info.st_mode & (S_IRWXG | S_IRWXO)))
+    throw InputError(fmt::format("--join: {}: want a folder that only this user can use", folder));
+  return folder;
+}
 
 void require(bool good, const char* what) {
   if (!good)
@@ -34,7 +67,43 @@ void write(const char* file, const std::string& text) {
   require(out.good(), file);
 }
 
+/// Into the network of a process; false when it ended meanwhile.
+bool enterNetworkOf(const std::string& process) {
+  const File user("/proc/" + process + "/ns/user", O_RDONLY);
+  const File network("/proc/" + process + "/ns/net", O_RDONLY);
+  if (user.descriptor < 0 || network.descriptor < 0) return false;
+  require(setns(user.descriptor, CLONE_NEWUSER) == 0, "its users");
+  require(setns(network.descriptor, CLONE_NEWNET) == 0, "its network");
+  return true;
+}
+
 }  // namespace
+
+void joinPrivateBus(const std::string& name) {
+  if (name.empty() || name.size() > 64 ||
+      name.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-") !=
+          std::string::npos)
+    throw InputError(fmt::format("--join '{}': want letters, digits, _ and -", name));
+  const std::string path = registry() + "/" + name;
+  const File lock(path + ".lock", O_RDWR | O_CREAT);
+  require(lock.descriptor >= 0 && flock(lock.descriptor, LOCK_EX) == 0, path.c_str());
+  // Of those that were here, who still is: a number that another process has now is in another
+  // network.
+  std::ifstream in(path);
+  std::string process, here;
+  bool joined = false;
+  for (ino_t network; in >> process >> network;) {
+    if (networkOf(process) != network) continue;
+    here += fmt::format("{} {}\n", process, network);
+    joined = joined || enterNetworkOf(process);
+  }
+  in.close();
+  if (!joined) {
+    here.clear();
+    enterPrivateBus();
+  }
+  write(path.c_str(), here + fmt::format("{} {}\n", getpid(), networkOf("self")));
+}
 
 void enterPrivateBus() {
   const uid_t user = geteuid();

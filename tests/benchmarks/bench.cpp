@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
 #include <kdl/chainidsolver_recursive_newton_euler.hpp>
 
 #include "support/poses.hpp"
@@ -18,6 +19,8 @@
 #include "ves/realtime/realtime.hpp"
 #include "ves/run/replay.hpp"
 #include "ves/run/run.hpp"
+#include "ves/transport/channels.hpp"
+#include "ves/transport/key.hpp"
 
 namespace ves {
 namespace {
@@ -322,6 +325,36 @@ void LockstepDemoOverTheBus(benchmark::State& state) {
   rates(state, simulated, ticks);
 }
 BENCHMARK(LockstepDemoOverTheBus)->UseRealTime()->Iterations(1)->Unit(benchmark::kMillisecond);
+
+/// What a key costs the controller in a tick: command, state and timing signed, five samples checked.
+void SignAndCheckATick(benchmark::State& state) {
+  const std::string file =
+      std::filesystem::temp_directory_path() / fmt::format("ves-bench-{}.key", getpid());
+  std::ofstream(file) << std::string(64, '5');
+  std::filesystem::permissions(file, std::filesystem::perms::owner_read);
+  const Key key(file);
+  std::filesystem::remove(file);
+  const auto encoded = [](const auto& message) {
+    std::vector<std::uint8_t> bytes(static_cast<std::size_t>(message.getEncodedSize()));
+    message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+    return bytes;
+  };
+  std::vector<std::uint8_t> command = encoded(leg_command_t{}), told = encoded(state_t{}),
+                            timing = encoded(timing_t{}), sample = encoded(sample_t{});
+  key.sign(channel::kSample, sample.data(), sample.size());
+  ReplayGuard guard;
+  for (auto _ : state) {
+    key.sign(channel::kLegCommand, command.data(), command.size());
+    key.sign(channel::kState, told.data(), told.size());
+    key.sign(channel::kTiming, timing.data(), timing.size());
+    bool good = true;
+    for (int i = 0; i < 5; ++i)
+      good = good && key.signedBy(channel::kSample, sample.data(), sample.size()) &&
+             guard.fresh(channel::kSample, sample.data());
+    benchmark::DoNotOptimize(good);
+  }
+}
+BENCHMARK(SignAndCheckATick);
 
 void ReplayDemo(benchmark::State& state) {
   const std::string log =

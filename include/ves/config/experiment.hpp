@@ -20,6 +20,34 @@
 
 namespace ves {
 
+/// Where a piece of the machine is.
+enum class Source {
+  kSimulated,
+  kExternal,  // a driver on the bus
+  kNetFt      // a force sensor that speaks ATI's RDT
+};
+
+struct NetFtAddress {
+  std::string host;
+  int port = 0;       // [-] UDP, of its records
+  int http_port = 0;  // [-] of its configuration
+};
+
+struct MachineConfig {
+  Source legs = Source::kSimulated;
+  Source force_sensor = Source::kSimulated;
+  Source robot = Source::kSimulated;
+  Source switches = Source::kSimulated;
+  NetFtAddress net_ft;
+  double follow = 0.0;  // [1/s] bandwidth at which simulated pieces follow real legs and joints
+
+  bool simulated() const {
+    for (const Source s : {legs, force_sensor, robot, switches})
+      if (s != Source::kSimulated) return false;
+    return true;
+  }
+};
+
 /// One experiment, complete: what the controller believes, what the plant is, and the text both
 /// came from.
 struct Experiment {
@@ -27,6 +55,8 @@ struct Experiment {
   std::string description;
   ControllerConfig controller;
   plant::PlantConfig plant;
+  MachineConfig machine;
+  std::string key_file;         // of the bus; empty: none
   UrdfRobot robot;              // as configured; without frames: none
   std::optional<ArmShape> arm;  // that the base is the tip of
   std::vector<std::string> warnings;

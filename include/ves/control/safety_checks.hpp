@@ -17,7 +17,8 @@ enum class Check : std::uint32_t {
   kPanicButton,
   kFloorMat,
   kFinite,             // NaN or infinity, anywhere in the tick
-  kStale,              // no new sample for too long
+  kStale,              // no new sample for too long, or one with a piece that old
+  kDevice,             // legs, sensor or robot say that they are at fault
   kOverrun,            // ticks missed: one long stall, or too many in a second
   kLegReading,         // a leg's reading jumped as no leg can
   kForwardKinematics,  // the measured legs belong to no pose
@@ -114,6 +115,9 @@ bool velocityCheck(const SafetyLimits&, const Vec6& L, const Vec6& L_last, doubl
 /// [m/s] a leg has had lately, the farther behind it may be.
 bool positionErrorCheck(const SafetyLimits&, const Vec6& L_expected, const Vec6& L_measured,
                         const Vec6& speed) noexcept;
+
+/// No piece of the sample is older than stale_ticks.
+bool pieceAgeCheck(const SafetyLimits&, const Sample& sample, double period) noexcept;
 
 /// The pressure's reading is between its limits.
 bool pressureCheck(const SafetyLimits&, const AdcCounts& adc) noexcept;

@@ -3,6 +3,7 @@
 // What the controller may know of the machine: counts, joint angles, switches. Nothing else.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 
@@ -21,14 +22,27 @@ using LegCounts = std::array<std::int32_t, kLegs>;
 enum Switch : std::uint32_t { kPanicButtonClosed = 1u, kFloorMatClosed = 2u };
 inline constexpr std::uint32_t kAllSwitchesClosed = kPanicButtonClosed | kFloorMatClosed;
 
+/// Pieces of the machine that can say of themselves that they are at fault.
+enum Piece : std::uint32_t { kLegsPiece = 1u, kSensorPiece = 2u, kRobotPiece = 4u };
+inline constexpr std::uint32_t kAllPieces = kLegsPiece | kSensorPiece | kRobotPiece;
+
 struct Sample {
   std::int64_t sequence = -1;           // [-] counts up by one; -1: nothing received yet
-  std::int64_t time = 0;                // [ns] the plant's clock when it was taken
+  std::int64_t time = 0;                // [ns] the machine's clock when it was put together
+  std::int64_t legs_time = 0;           // [ns] the same clock when the legs were read,
+  std::int64_t wrench_time = 0;         // [ns] the six wrench channels,
+  std::int64_t joints_time = 0;         // [ns] the robot's joints
   AdcCounts adc{};                      // [count]
   LegCounts legs{};                     // [count] Temposonics
   JointVector q = JointVector::Zero();  // [rad | m] the robot's joints
   std::uint32_t switches = 0;           // bits of Switch
   double temperature = 20.0;            // [C] of the laboratory, by a thermometer beside the sensor
+  std::uint32_t faults = 0;             // bits of Piece
+
+  /// [ns] of the piece that is oldest, when the sample was put together.
+  std::int64_t oldest() const noexcept {
+    return time - std::min({legs_time, wrench_time, joints_time});
+  }
 };
 
 struct LegCommand {

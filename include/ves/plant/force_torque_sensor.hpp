@@ -39,6 +39,10 @@ class ForceTorqueSensor {
   enum class Over { kRamp, kConstant };
   void advance(const Step& step, const Wrench& F_So_S, Over over) noexcept;
 
+  /// F_So_S that the converter's input stands for, `warmer` [C] than when the bias was named: filtered,
+  /// with noise and stray voltage, before it is rounded to counts.
+  Wrench reading(double warmer) const noexcept;
+
   /// Sixteen bits, saturating, of all seven channels, `warmer` [C] than when the bias was named.
   AdcCounts convert(double warmer) const noexcept;
 
@@ -47,6 +51,7 @@ class ForceTorqueSensor {
 
   ForceTorqueSensorModel model_;
   Mat6 volts_per_newton_;  // [V/N | V/(N m)] bridge and amplifier
+  Mat6 newtons_per_volt_;
   Channels noise_gain_;    // [V/sqrt(Hz)] after the amplifier
   bool noisy_;
   Butterworth2<kWrenchChannels> filter_;

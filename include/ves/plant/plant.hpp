@@ -12,6 +12,7 @@
 // The periods are no multiples of each other. Between events the actuators are integrated exactly.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "ves/control/program.hpp"
@@ -79,6 +80,7 @@ struct Truth {
   BodyMotion P;           // platform; its accelerations are means since the last step
   Pose x;                 // about home
   Wrench F_Po_I;          // on the platform from all the sensor carries
+  Wrench F_So_S;          // what the sensor reads, before it is rounded to counts
   JointState joints;
   LegMotion legs;               // of the actuators, unfiltered
   Vec6 current = Vec6::Zero();  // [A] valves
@@ -99,6 +101,11 @@ class Plant {
 
   /// Begins now; false where MovingRobot::begin() refuses.
   bool moveRobot(const RobotAction& action) noexcept { return robot_.begin(action, now_); }
+
+  /// Legs, or joints, that are elsewhere: the platform, or the robot, is where they say from the
+  /// next step on, and no longer where the simulated ones are.
+  void follow(const LegMotion& legs) noexcept { real_legs_ = legs; }
+  void follow(const JointState& joints) noexcept { real_joints_ = joints; }
 
   /// Time passes, up to and including the events at `until` [ns]. Where nothing moves, more than
   /// kSkipped of it are passed over at once: the noise goes on from where it was.
@@ -156,6 +163,8 @@ class Plant {
   std::vector<bool> robot_event_done_;
   int refused_events_ = 0;
   MovingRobot robot_;  // all rigid plates counted into its base
+  std::optional<LegMotion> real_legs_;
+  std::optional<JointState> real_joints_;
   Truth truth_;
 };
 

@@ -55,6 +55,9 @@ class RunRecorder {
   virtual void order(const operator_t& order, std::int64_t time) = 0;
 };
 
+/// Throws InputError where a piece of the machine is real: lockstep has no time for it.
+void requireSimulated(const Experiment& experiment);
+
 /// The experiment in one process without a bus, as fast as it goes; bit-identical for one seed.
 /// `first` is the order of the first tick.
 RunResult runLockstep(const Experiment& experiment, LogWriter* log, const Watch& watch,

@@ -63,6 +63,7 @@ class Session {
   std::optional<state_t> state_;
   std::int64_t heard_ = 0;   // [-] states
   std::int64_t orders_ = 0;  // [-] given
+  std::int64_t machine_ = 0;  // header.source of its samples; 0: none yet
   RunResult result_;
   OnState on_state_;
   OnMessage on_message_;

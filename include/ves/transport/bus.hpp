@@ -13,15 +13,39 @@
 #include <utility>
 #include <vector>
 
+#include "ves/realtime/clock_offset.hpp"
+#include "ves/transport/key.hpp"
 #include "ves/transport/messages.hpp"
 
 namespace ves {
 
 inline constexpr const char* kDefaultUrl = "udpm://239.255.76.67:7667?ttl=0";
 
+/// udpm://ADDRESS:PORT[?ttl=N][&key=FILE]. Throws InputError.
+struct BusAddress {
+  explicit BusAddress(const std::string& url);
+
+  std::string lcm;       // what LCM understands
+  int ttl = 0;           // [-] routers that a message may cross, and one more network
+  std::string key_file;  // empty: the bus has no key
+};
+
+/// One line where anybody in reach can command the legs: ttl above 0, and no key; else empty.
+std::string openBusWarning(const std::string& url);
+
+/// Messages that a bus with a key did not hand on.
+struct Refused {
+  std::int64_t forged = 0;    // [-] not signed with the key, or changed since
+  std::int64_t replayed = 0;  // [-] signed, and older than one before of that sender
+
+  /// As "2 messages ignored that the bus's key has not signed, 1 heard before"; empty when none.
+  std::string text() const;
+};
+
 class Bus {
  public:
-  /// Opens the bus and proves that a message comes back. Throws InputError with the remedy.
+  /// Opens the bus and proves that a message comes back. Throws InputError with the remedy. With a
+  /// key it signs what it sends, and hands on only what is signed and has not been before.
   explicit Bus(const std::string& url);
 
   /// Encodes on the stack: no heap.
@@ -29,8 +53,10 @@ class Bus {
   void publish(const std::string& channel, const Message& message) noexcept {
     std::array<std::uint8_t, 4096> buffer;
     const int size = message.encode(buffer.data(), 0, static_cast<int>(buffer.size()));
-    if (size < 0 || lcm_.publish(channel, buffer.data(), static_cast<unsigned>(size)) != 0)
+    if (size < 0)
       ++failed_;
+    else
+      send(channel, buffer.data(), static_cast<std::size_t>(size));
   }
   /// For the one message that has no fixed size.
   void publish(const std::string& channel, const experiment_t& message);
@@ -47,17 +73,27 @@ class Bus {
   /// Waits for one message; false when none came in time.
   bool wait(int milliseconds) noexcept;
 
+  /// [ns] monotonic, when the message that a handler has in hand came to this host.
+  std::int64_t arrival() const noexcept { return arrival_; }
+  bool keyed() const noexcept { return key_.has_value(); }
+  const Refused& refused() const noexcept { return refused_; }
   std::int64_t failed() const noexcept { return failed_; }  // [-] messages not sent
 
  private:
   struct Subscriber {
+    Bus& bus;
     Handler handler;
-    void receive(const lcm::ReceiveBuffer* buffer, const std::string& channel) {
-      handler(channel, buffer->data, buffer->data_size);
-    }
+    void receive(const lcm::ReceiveBuffer* buffer, const std::string& channel);
   };
+  void send(const std::string& channel, std::uint8_t* message, std::size_t size) noexcept;
+  bool lets(const std::string& channel, const void* message, std::size_t size) noexcept;
 
+  BusAddress address_;
+  std::optional<Key> key_;
   lcm::LCM lcm_;
+  ReplayGuard guard_;
+  Refused refused_;
+  std::int64_t arrival_ = 0;  // [ns]
   std::vector<std::unique_ptr<Subscriber>> subscribers_;
   std::int64_t failed_ = 0;
 };
@@ -68,6 +104,10 @@ bool busWorks(const std::string& url);
 /// Moves this process (and what it starts) to a network of its own, where loopback carries
 /// multicast: nothing leaks out or in. Call before any thread starts. Throws InputError.
 void enterPrivateBus();
+
+/// The same network for all programs of this user that name it: the first begins it, and it is gone
+/// with the last. Throws InputError.
+void joinPrivateBus(const std::string& name);
 
 /// Samples that were not let in, by cause.
 struct Rejections {
@@ -83,7 +123,8 @@ struct Rejections {
 
 /// The controller's side: the newest sample, the operator's orders, whether somebody else is there.
 ///
-/// A machine that was started anew takes the place of the old one while nothing is engaged. From
+/// On a bus with a key a machine is taken only when its sample names a command of this controller:
+/// so it is alive, and no recording. A machine that was started anew takes the place of the old one while nothing is engaged. From
 /// then on the machine is the machine: samples of another are not let in and count as a
 /// conflict.
 class ControllerLink {
@@ -99,8 +140,13 @@ class ControllerLink {
   bool takeConflict() noexcept { return std::exchange(conflict_, false); }
   std::int64_t rejected() const noexcept { return rejected_; }  // [-] messages not let in
   const Rejections& samplesRejected() const noexcept { return samples_rejected_; }
+  /// [-] header.source of the machine that samples come from; 0 before the first.
+  std::int64_t machine() const noexcept { return plant_.source; }
+  /// Of the machine's clock, from commands and the samples that name them.
+  const ClockOffset& clock() const noexcept { return clock_; }
 
-  void send(const leg_command_t& command) noexcept;
+  /// To the machine that was heard.
+  void send(leg_command_t command) noexcept;
 
  private:
   Bus& bus_;
@@ -110,7 +156,15 @@ class ControllerLink {
   std::int64_t sample_time_ = 0;
   Identity plant_;
   bool engaged_ = false;
+  void receiveSample(const void* data, std::uint32_t size) noexcept;
   void receiveOrder(const operator_t& message) noexcept;
+
+  struct Sent {
+    std::int64_t sequence = -2;
+    std::int64_t time = 0;  // [ns]
+  };
+  std::array<Sent, 64> sent_{};  // the last commands, by sequence
+  ClockOffset clock_;
 
   static constexpr std::size_t kOrders = 16;
   std::array<Order, kOrders> orders_{};  // that wait, oldest first
@@ -128,7 +182,9 @@ class PlantLink {
   /// A controller keeps the legs until it lets go or is silent for so long.
   static constexpr std::int64_t kSilence = 500'000'000;  // [ns]
 
-  explicit PlantLink(Bus& bus);
+  /// On a bus with a key, commands and orders of the robot have to name `self`: those of an earlier
+  /// machine are replayed ones.
+  PlantLink(Bus& bus, const Identity& self);
 
   /// The plant's clock, by which silence counts.
   void setTime(std::int64_t now) noexcept { now_ = now; }
@@ -137,12 +193,23 @@ class PlantLink {
   std::optional<std::pair<LegCommand, std::int64_t>> takeCommand() noexcept {
     return std::exchange(command_, std::nullopt);
   }
+  /// The last command that came, for the samples to name; clocks are compared by it.
+  struct Heard {
+    std::int64_t source = 0;
+    std::int64_t sequence = 0;
+    std::int64_t time = 0;  // [ns] of arrival
+  };
+  const Heard& lastHeard() const noexcept { return last_heard_; }
   std::vector<RobotOrder> takeRobotOrders() { return std::exchange(robot_orders_, {}); }
   std::int64_t rejected() const noexcept { return rejected_; }
 
  private:
-  bool mayCommand(const header_t& from, bool engaged) noexcept;
+  bool mayCommand(const header_t& from, std::int64_t machine, bool engaged) noexcept;
+  bool means(std::int64_t machine) const noexcept;
 
+  Bus& bus_;
+  Identity self_;
+  Heard last_heard_;
   std::int64_t now_ = 0;  // [ns]
   Identity master_;       // who has the legs
   bool engaged_ = false;

@@ -9,6 +9,10 @@ namespace ves::channel {
 
 // At most 15 characters: such a string needs no heap.
 inline const std::string kSample = "VES_SAMPLE";
+inline const std::string kLegs = "VES_LEGS";  // of drivers of one piece: sample_t, their part of it
+inline const std::string kWrench = "VES_WRENCH";
+inline const std::string kJoints = "VES_JOINTS";
+inline const std::string kSwitches = "VES_SWITCHES";
 inline const std::string kLegCommand = "VES_LEG_COMMAND";
 inline const std::string kState = "VES_STATE";
 inline const std::string kTruth = "VES_TRUTH";

@@ -12,7 +12,7 @@
 namespace ves {
 
 // The digits that the comments of state_t.lcm and operator_t.lcm name.
-static_assert(static_cast<int>(Check::kCount) == 20);
+static_assert(static_cast<int>(Check::kCount) == 21);
 static_assert(static_cast<int>(SegmentKind::kPath) == 5 &&
               static_cast<int>(SegmentKind::kCount) == 6);
 static_assert(static_cast<int>(Request::kUncompensate) == 9);
@@ -70,6 +70,7 @@ void forEachField(const state_t& m, F f) {
 
 template <typename F>
 void forEachField(const leg_command_t& m, F f) {
+  f("machine", m.machine);
   f("engaged", m.engaged);
   f("segment", m.segment);
   f("park", m.park);
@@ -77,7 +78,7 @@ void forEachField(const leg_command_t& m, F f) {
 }
 
 inline constexpr std::size_t kFingerprintSize = 8;  // [B] of every encoded message
-inline constexpr std::size_t kHeaderSize = 32;      // [B] of header_t, which leads every message
+inline constexpr std::size_t kHeaderSize = 48;      // [B] of header_t, which leads every message
 
 /// "state_t.x[2]": whose encoding holds the byte at `offset` of a Message.
 template <typename Message>

@@ -5,19 +5,16 @@
 #include "ves/realtime/realtime.hpp"
 #include "ves/run/announcer.hpp"
 #include "ves/run/flight_record.hpp"
-#include "ves/run/robot_orders.hpp"
 #include "ves/run/run.hpp"
 #include "ves/run/run_monitor.hpp"
+#include "process_conduct.hpp"
 #include "ves/transport/channels.hpp"
 
 namespace ves {
 namespace {
 
 constexpr int kControllerPriority = 80;             // [-] SCHED_FIFO
-constexpr int kPlantPriority = 70;                  // [-] SCHED_FIFO
-constexpr std::int64_t kPlantPeriod = 2'000'000;    // [ns] between the plant's samples, real time
 constexpr int kAnswerTime = 200;                    // [ms] lockstep, before a message is repeated
-constexpr std::int64_t kLongestLeap = 100'000'000;  // [-] ticks that a command may pass over
 constexpr int kAnswerTries = 50;                    // [-] before the other side counts as gone
 constexpr std::int64_t kFirstSampleTime = 10'000'000'000;  // [ns]
 constexpr std::int64_t kWorthAWord = 2'000'000'000;        // [ns]
@@ -31,16 +28,31 @@ void count(timing_t& t) noexcept {
   ++t.sample_to_command[latencyBin(t.sample_to_command_ns)];
 }
 
-void enableRealtime(const char* who, int priority, bool required) {
-  if (!claimRealtime(priority, required))
-    fmt::print(stderr,
-               "{}: no real-time privileges, running at best effort; ./ves doctor says why\n", who);
+/// What was not let in, by cause; empty when all was.
+std::string notLetIn(const ControllerLink& link, const Bus& bus) {
+  std::string out = link.samplesRejected().text();
+  if (const std::string refused = bus.refused().text(); !refused.empty())
+    out += (out.empty() ? "" : "; ") + refused;
+  return out;
+}
+
+/// Ages by our clock, of a sample whose times are the machine's.
+void putAges(timing_t& t, const Sample& sample, std::int64_t sample_time, const ClockOffset& clock,
+             std::int64_t woke, std::int64_t sent) noexcept {
+  t.clock_offset_ns = clock.offset(woke);
+  t.clock_uncertainty_ns = clock.uncertainty(woke);
+  t.sample_age_ns = woke - (sample_time - t.clock_offset_ns);
+  t.legs_age_ns = t.sample_age_ns + sample.time - sample.legs_time;
+  t.wrench_age_ns = t.sample_age_ns + sample.time - sample.wrench_time;
+  t.joints_age_ns = t.sample_age_ns + sample.time - sample.joints_time;
+  t.sample_to_command_ns = sent - woke + t.sample_age_ns;
 }
 
 }  // namespace
 
 RunResult runController(const Experiment& experiment, const ProcessOptions& options,
                         const Watch& watch) {
+  warnOfOpenBus("controller", options.url);
   const Identity self = Identity::draw();
   Bus bus(options.url);
   ControllerLink link(bus, self);
@@ -126,10 +138,13 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
       told = true;
       fmt::print(stderr, "controller: waiting for a machine on {}\n", options.url);
     }
+    const std::string why = notLetIn(link, bus);
     if (monotonicNow() - start > kFirstSampleTime)
       throw InputError(fmt::format(
           "bus {}: no machine to be heard{}", options.url,
-          link.samplesRejected().total() > 0 ? "; " + link.samplesRejected().text() : ""));
+          why.empty() ? "" : "; " + why));
+    // Who is here: on a bus with a key a machine is believed when it answers.
+    link.send(toMessage(LegCommand(), header(self, -1, monotonicNow())));
     bus.wait(100);
   }
   Ticker ticker(experiment.controller.period);
@@ -163,104 +178,22 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
     timing.send_ns = sent - ticked;
     timing.compute_ns = sent - woke;
     timing.tell_ns = over - sent;
-    timing.sample_age_ns = woke - sample_time;
-    timing.sample_to_command_ns = sent - sample_time;
+    putAges(timing, in.sample, sample_time, link.clock(), woke, sent);
     timing.missed = ticker.missed();
     timing.samples_malformed = link.samplesRejected().malformed;
     timing.samples_out_of_range = link.samplesRejected().out_of_range;
     timing.samples_of_another = link.samplesRejected().of_another;
     timing.samples_old = link.samplesRejected().old;
+    timing.messages_forged = bus.refused().forged;
+    timing.messages_replayed = bus.refused().replayed;
     (ran_long ? timing.missed_ran_long : timing.missed_woke_late) += missed;
     count(timing);
     bus.publish(channel::kTiming, timing);
     if (finish(state)) break;
   }
   RunResult result = monitor.result(monotonicNow() - start);
-  result.rejected = link.samplesRejected().text();
+  result.rejected = notLetIn(link, bus);
   return result;
-}
-
-void runPlant(const Experiment& experiment, const ProcessOptions& options,
-              const std::function<bool()>& stop) {
-  const Identity self = Identity::draw();
-  Bus bus(options.url);
-  PlantLink link(bus);
-  plant::Plant plant(experiment.plant);
-  RobotOrders robot(experiment);
-  constexpr const char* kNotNow = "it is in motion, elsewhere, or its hand is not free for that";
-  int refused_events = 0;
-  const std::int64_t period = experiment.controller.period;
-
-  const auto begin = [&](const std::optional<RobotAction>& action) {
-    if (action && !plant.moveRobot(*action)) throw InputError(kNotNow);
-  };
-  const auto refusable = [](const auto& act) {
-    try {
-      act();
-    } catch (const InputError& error) {
-      fmt::print(stderr, "plant: the robot does not do that: {}\n", error.what());
-    }
-  };
-  const auto moveRobot = [&](bool wait) {
-    for (const RobotOrder& order : link.takeRobotOrders())
-      refusable([&] { begin(robot.take(order, plant.truth())); });
-    refusable([&] { begin(robot.done(wait)); });
-    if (plant.refusedEvents() > std::exchange(refused_events, plant.refusedEvents()))
-      fmt::print(stderr, "plant: the robot leaves out an event of the program: {}\n", kNotNow);
-  };
-
-  const auto publish = [&](std::int64_t time, std::int64_t answers) {
-    const Sample sample = plant.sample();
-    bus.publish(channel::kTruth, toMessage(plant.truth(), header(self, sample.sequence, time)));
-    sample_t message = toMessage(sample, self, answers);
-    message.header.time_ns = time;
-    bus.publish(channel::kSample, message);
-    return message;
-  };
-
-  if (options.lockstep) {
-    std::int64_t answered = -2;  // tick
-    std::int64_t start = 0;      // [ns] plant time of the controller's tick 0
-    sample_t last;
-    while (!stop()) {
-      bus.wait(100);
-      link.setTime(monotonicNow());
-      moveRobot(true);
-      const auto command = link.takeCommand();
-      if (!command) continue;
-      const auto& [legs, tick] = *command;
-      if (tick == -1 && answered >= 0) {  // another controller begins
-        answered = -2;
-        start = plant.time();
-      }
-      if (tick == answered) {
-        bus.publish(channel::kSample, last);
-      } else if (tick == -1 ||
-                 (answered > -2 && tick > answered && tick - answered < kLongestLeap)) {
-        if (tick >= 0) {
-          plant.command(legs);
-          plant.advance(start + (tick + 1) * period);
-        }
-        last = publish(plant.time(), tick);
-        answered = tick;
-      }
-    }
-    return;
-  }
-
-  enableRealtime("plant", kPlantPriority, options.realtime);
-  const std::int64_t start = monotonicNow();
-  Ticker ticker(kPlantPeriod);
-  while (!stop()) {
-    ticker.wait();
-    bus.drain();
-    const std::int64_t now = monotonicNow();
-    link.setTime(now);
-    moveRobot(false);
-    if (const auto command = link.takeCommand()) plant.command(command->first);
-    plant.advance(now - start);
-    publish(now, -1);
-  }
 }
 
 }  // namespace ves

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/devices/net_ft.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <netdb.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <time.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <memory>
+
+#include "ves/base/errors.hpp"
+#include "ves/realtime/realtime.hpp"
+
+namespace ves::devices {
+namespace {
+
+constexpr int kPatience = 2000;                    // [ms] for the sensor's web page
+constexpr std::int64_t kSilence = 500'000'000;     // [ns]
+constexpr std::int64_t kLookAgain = 1'000'000'000;  // [ns] at the calibration
+
+struct Descriptor {
+  int number = -1;
+  ~Descriptor() {
+    if (number >= 0) close(number);
+  }
+};
+
+std::string nameOf(const NetFtAddress& address, int port) {
+  return fmt::format("force sensor {}:{}", address.host, port);
+}
+
+/// A socket that is connected, or being connected, and does not block.
+int connected(const NetFtAddress& address, int port, int type) {
+  addrinfo hints{};
+  hints.ai_family = AF_UNSPEC;
+  hints.ai_socktype = type;
+  addrinfo* found = nullptr;
+  const int error = getaddrinfo(address.host.c_str(), std::to_string(port).c_str(), &hints, &found);
+  if (error) throw InputError(fmt::format("{}: {}", nameOf(address, port), gai_strerror(error)));
+  const std::unique_ptr<addrinfo, void (*)(addrinfo*)> owner(found, freeaddrinfo);
+  const int fd =
+      socket(found->ai_family, found->ai_socktype | SOCK_CLOEXEC | SOCK_NONBLOCK, found->ai_protocol);
+  if (fd < 0 || (connect(fd, found->ai_addr, found->ai_addrlen) != 0 && errno != EINPROGRESS)) {
+    const int why = errno;
+    if (fd >= 0) close(fd);
+    throw InputError(fmt::format("{}: {}", nameOf(address, port), std::strerror(why)));
+  }
+  return fd;
+}
+
+}  // namespace
+
+std::string fetchNetFtXml(const NetFtAddress& address, int patience) {
+  constexpr std::size_t kLongest = 65536;  // [B]
+  const auto fail = [&](const std::string& why) {
+    throw InputError(
+        fmt::format("{}: /netftapi2.xml: {}", nameOf(address, address.http_port), why));
+  };
+  const Descriptor fd{connected(address, address.http_port, SOCK_STREAM)};
+  const std::int64_t until = monotonicNow() + patience * 1'000'000LL;
+  const auto wait = [&](short events) {
+    const std::int64_t left = (until - monotonicNow()) / 1'000'000;
+    pollfd p{fd.number, events, 0};
+    if (left <= 0 || poll(&p, 1, static_cast<int>(left)) <= 0) fail("no answer");
+  };
+  wait(POLLOUT);
+  const std::string request =
+      fmt::format("GET /netftapi2.xml HTTP/1.0\r\nHost: {}\r\n\r\n", address.host);
+  if (send(fd.number, request.data(), request.size(), MSG_NOSIGNAL) !=
+      static_cast<ssize_t>(request.size()))
+    fail(std::strerror(errno));
+  std::string answer;
+  char buffer[4096];
+  for (;;) {
+    wait(POLLIN);
+    const ssize_t got = recv(fd.number, buffer, sizeof buffer, 0);
+    if (got == 0) break;
+    if (got < 0 && (errno == EAGAIN || errno == EINTR)) continue;
+    if (got < 0) fail(std::strerror(errno));
+    answer.append(buffer, static_cast<std::size_t>(got));
+    if (answer.size() > kLongest) fail("longer than 64 kB");
+  }
+  if (answer.rfind("HTTP/1.", 0) != 0 || answer.substr(8, 4) != " 200")
+    fail(fmt::format("answers '{}'", answer.substr(0, std::min<std::size_t>(
+                                                          answer.find_first_of("\r\n"), 60))));
+  return answer;
+}
+
+NetFt::NetFt(const NetFtAddress& address, const Mat6& S_proc)
+    : address_(address),
+      calibration_(netFtCalibration(fetchNetFtXml(address, kPatience))),
+      stream_(calibration_, S_proc),
+      socket_(connected(address, address.port, SOCK_DGRAM)) {
+  const int on = 1, room = 1 << 20;
+  setsockopt(socket_, SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof on);
+  setsockopt(socket_, SOL_SOCKET, SO_RCVBUF, &room, sizeof room);
+  ask(monotonicNow());
+  watcher_ = std::thread([this] { watchCalibration(); });
+}
+
+NetFt::~NetFt() {
+  over_ = true;
+  watcher_.join();
+  const auto stop = encode(RdtRequest{RdtCommand::kStop, 0});
+  send(socket_, stop.data(), stop.size(), MSG_NOSIGNAL);
+  close(socket_);
+}
+
+void NetFt::ask(std::int64_t now) noexcept {
+  const auto request = encode(RdtRequest{RdtCommand::kStream, 0});
+  send(socket_, request.data(), request.size(), MSG_NOSIGNAL);
+  asked_ = now;
+}
+
+void NetFt::watchCalibration() {
+  for (std::int64_t next = monotonicNow() + kLookAgain; !over_;) {
+    usleep(20'000);
+    if (monotonicNow() < next) continue;
+    try {
+      if (netFtCalibration(fetchNetFtXml(address_, kPatience)) != calibration_) changed_ = true;
+    } catch (const InputError&) {  // a busy web page is no fault; its records say how it is
+    }
+    next = monotonicNow() + kLookAgain;
+  }
+}
+
+bool NetFt::read(WrenchReading& out) noexcept {
+  const std::int64_t now = monotonicNow();
+  const std::int64_t behind = wallNow() - now;  // [ns] from this clock to the kernel's stamps
+  for (;;) {
+    std::uint8_t data[kRdtRecordSize + 1];
+    alignas(cmsghdr) char control[64];
+    iovec part{data, sizeof data};
+    msghdr message{};
+    message.msg_iov = &part;
+    message.msg_iovlen = 1;
+    message.msg_control = control;
+    message.msg_controllen = sizeof control;
+    const ssize_t got = recvmsg(socket_, &message, MSG_DONTWAIT);
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0 && errno == ECONNREFUSED) continue;  // of an earlier request; it is taken off
+    if (got < 0) break;
+    std::int64_t came = now;
+    for (cmsghdr* c = CMSG_FIRSTHDR(&message); c; c = CMSG_NXTHDR(&message, c)) {
+      if (c->cmsg_level != SOL_SOCKET || c->cmsg_type != SCM_TIMESTAMPNS) continue;
+      timespec stamp;
+      std::memcpy(&stamp, CMSG_DATA(c), sizeof stamp);
+      const std::int64_t at = stamp.tv_sec * 1'000'000'000LL + stamp.tv_nsec - behind;
+      if (at <= now && now - at < kSilence) came = at;
+    }
+    const std::int64_t before = stream_.counters().records;
+    stream_.take(data, static_cast<std::size_t>(got), came);
+    if (stream_.counters().records > before) heard_ = now;
+  }
+  if (now - std::max(heard_, asked_) > kSilence) {
+    stream_.restart();
+    ask(now);
+  }
+  if (!stream_.read(out)) return false;
+  out.fault = out.fault || changed_;
+  return true;
+}
+
+}  // namespace ves::devices

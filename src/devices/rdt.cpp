@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/devices/rdt.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+#include "ves/base/errors.hpp"
+
+namespace ves::devices {
+namespace {
+
+constexpr std::uint16_t kRequest = 0x1234;
+
+std::uint32_t big32(const std::uint8_t* at) {
+  return static_cast<std::uint32_t>(at[0]) << 24 | static_cast<std::uint32_t>(at[1]) << 16 |
+         static_cast<std::uint32_t>(at[2]) << 8 | static_cast<std::uint32_t>(at[3]);
+}
+
+void putBig(std::uint8_t* at, std::uint32_t value, int bytes) {
+  for (int i = 0; i < bytes; ++i) at[i] = static_cast<std::uint8_t>(value >> (8 * (bytes - 1 - i)));
+}
+
+std::string_view textOf(std::string_view xml, const std::string& tag) {
+  const std::string open = "<" + tag + ">", close = "</" + tag + ">";
+  const std::size_t begin = xml.find(open);
+  const std::size_t end = begin == xml.npos ? xml.npos : xml.find(close, begin);
+  if (end == xml.npos) throw InputError(fmt::format("netftapi2.xml: {}: missing", tag));
+  return xml.substr(begin + open.size(), end - begin - open.size());
+}
+
+double positive(std::string_view xml, const std::string& tag) {
+  const std::string text(textOf(xml, tag));
+  char* end = nullptr;
+  const double value = std::strtod(text.c_str(), &end);
+  if (text.empty() || *end != '\0' || !(value > 0.0) || !(value < 1e12))
+    throw InputError(
+        fmt::format("netftapi2.xml: {}: '{}', want a number above 0", tag, text.substr(0, 40)));
+  return value;
+}
+
+struct Unit {
+  const char* name;
+  double si;  // [N | N m]
+};
+constexpr double kPound = 4.4482216152605, kFoot = 0.3048, kKilogram = 9.80665;
+constexpr Unit kForces[] = {{"N", 1.0},     {"kN", 1e3},       {"lbf", kPound},
+                            {"lb", kPound}, {"klbf", 1e3 * kPound}, {"kgf", kKilogram},
+                            {"kg", kKilogram}, {"gf", 1e-3 * kKilogram}, {"g", 1e-3 * kKilogram}};
+constexpr Unit kTorques[] = {{"Nm", 1.0},
+                             {"N-m", 1.0},
+                             {"Nmm", 1e-3},
+                             {"N-mm", 1e-3},
+                             {"kNm", 1e3},
+                             {"kN-m", 1e3},
+                             {"lbf-in", kPound * kFoot / 12.0},
+                             {"lb-in", kPound * kFoot / 12.0},
+                             {"lbf-ft", kPound * kFoot},
+                             {"lb-ft", kPound * kFoot},
+                             {"kgf-cm", 1e-2 * kKilogram},
+                             {"kg-cm", 1e-2 * kKilogram}};
+
+template <std::size_t N>
+double unit(std::string_view xml, const std::string& tag, const Unit (&units)[N]) {
+  const std::string_view text = textOf(xml, tag);
+  std::string names;
+  for (const Unit& u : units) {
+    if (text == u.name) return u.si;
+    names += fmt::format("{}{}", names.empty() ? "" : ", ", u.name);
+  }
+  throw InputError(
+      fmt::format("netftapi2.xml: {}: '{}', want one of {}", tag, text.substr(0, 40), names));
+}
+
+}  // namespace
+
+std::array<std::uint8_t, kRdtRequestSize> encode(const RdtRequest& request) noexcept {
+  std::array<std::uint8_t, kRdtRequestSize> out;
+  putBig(out.data(), kRequest, 2);
+  putBig(out.data() + 2, static_cast<std::uint32_t>(request.command), 2);
+  putBig(out.data() + 4, request.samples, 4);
+  return out;
+}
+
+std::optional<RdtRequest> rdtRequest(const std::uint8_t* data, std::size_t size) noexcept {
+  if (size != kRdtRequestSize || (data[0] << 8 | data[1]) != kRequest) return {};
+  return RdtRequest{static_cast<RdtCommand>(data[2] << 8 | data[3]), big32(data + 4)};
+}
+
+std::array<std::uint8_t, kRdtRecordSize> encode(const RdtRecord& record) noexcept {
+  std::array<std::uint8_t, kRdtRecordSize> out;
+  putBig(out.data(), record.sequence, 4);
+  putBig(out.data() + 4, record.sensor_sequence, 4);
+  putBig(out.data() + 8, record.status, 4);
+  for (std::size_t i = 0; i < kWrenchChannels; ++i)
+    putBig(out.data() + 12 + 4 * i, static_cast<std::uint32_t>(record.counts[i]), 4);
+  return out;
+}
+
+std::optional<RdtRecord> rdtRecord(const std::uint8_t* data, std::size_t size) noexcept {
+  if (size != kRdtRecordSize) return {};
+  RdtRecord r;
+  r.sequence = big32(data);
+  r.sensor_sequence = big32(data + 4);
+  r.status = big32(data + 8);
+  for (std::size_t i = 0; i < kWrenchChannels; ++i)
+    r.counts[i] = static_cast<std::int32_t>(big32(data + 12 + 4 * i));
+  return r;
+}
+
+NetFtCalibration netFtCalibration(std::string_view xml) {
+  NetFtCalibration out;
+  out.counts_per_newton = positive(xml, "cfgcpf") / unit(xml, "scfgfu", kForces);
+  out.counts_per_newton_metre = positive(xml, "cfgcpt") / unit(xml, "scfgtu", kTorques);
+  out.serial = textOf(xml, "cfgcalsn");
+  return out;
+}
+
+std::string netFtXml(const NetFtCalibration& calibration, int records_per_second) {
+  return fmt::format(
+      "<?xml version=\"1.0\" encoding=\"ISO-8859-1\"?>\n<netft>\n<runstat>0x00000000</runstat>\n"
+      "<cfgcalsel>0</cfgcalsel>\n<cfgnam>VES</cfgnam>\n<cfgcalsn>{}</cfgcalsn>\n"
+      "<cfgfu>2</cfgfu>\n<scfgfu>N</scfgfu>\n<cfgtu>3</cfgtu>\n<scfgtu>Nm</scfgtu>\n"
+      "<cfgcpf>{:.17g}</cfgcpf>\n<cfgcpt>{:.17g}</cfgcpt>\n<comrdte>Enabled</comrdte>\n"
+      "<comrdtrate>{}</comrdtrate>\n</netft>\n",
+      calibration.serial, calibration.counts_per_newton, calibration.counts_per_newton_metre,
+      records_per_second);
+}
+
+RdtStream::RdtStream(const NetFtCalibration& c, const Mat6& S_proc) noexcept {
+  Vec6 per_count;
+  per_count << Vec3::Constant(1.0 / c.counts_per_newton),
+      Vec3::Constant(1.0 / c.counts_per_newton_metre);
+  counts_per_count_ = S_proc * per_count.asDiagonal();
+}
+
+void RdtStream::take(const std::uint8_t* data, std::size_t size, std::int64_t time) noexcept {
+  const auto record = rdtRecord(data, size);
+  if (!record) {
+    ++counters_.malformed;
+    return;
+  }
+  if (known_) {
+    const auto ahead = static_cast<std::int32_t>(record->sequence - newest_.sequence);
+    if (ahead <= 0) {
+      ++(ahead == 0 ? counters_.repeated : counters_.late);
+      return;
+    }
+    counters_.lost += ahead - 1;
+  }
+  known_ = any_ = true;
+  newest_ = *record;
+  time_ = time;
+  ++counters_.records;
+}
+
+bool RdtStream::read(WrenchReading& out) const noexcept {
+  if (!any_) return false;
+  Vec6 counts;
+  for (int i = 0; i < kWrenchChannels; ++i)
+    counts(i) = newest_.counts[static_cast<std::size_t>(i)];
+  const Vec6 converter = counts_per_count_ * counts;
+  for (int i = 0; i < kWrenchChannels; ++i)
+    out.counts[static_cast<std::size_t>(i)] =
+        static_cast<std::int32_t>(std::lround(std::clamp(converter(i), -32768.0, 32767.0)));
+  out.time = time_;
+  constexpr std::uint32_t kSummary = 0x80000000, kThreshold = 0x00010000;  // a latch, no error
+  out.fault = newest_.status != 0 && newest_.status != kThreshold &&
+              newest_.status != (kSummary | kThreshold);
+  return true;
+}
+
+}  // namespace ves::devices

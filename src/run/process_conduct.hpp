@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// What the controller's and the machine's process say when they begin.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <cstdio>
+
+#include "ves/realtime/realtime.hpp"
+#include "ves/transport/bus.hpp"
+
+namespace ves {
+
+inline void enableRealtime(const char* who, int priority, bool required) {
+  if (!claimRealtime(priority, required))
+    fmt::print(stderr,
+               "{}: no real-time privileges, running at best effort; ./ves doctor says why\n", who);
+}
+
+inline void warnOfOpenBus(const char* who, const std::string& url) {
+  if (const std::string warning = openBusWarning(url); !warning.empty())
+    fmt::print(stderr, "{}: {}\n", who, warning);
+}
+
+}  // namespace ves

@@ -1,0 +1,540 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Pieces of the machine that are real: a Net F/T sensor, drivers on the bus, other hosts' clocks.
+#include "ves/devices/machine.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+
+#include <random>
+
+#include "support/programs.hpp"
+#include "support/rdt_sensor.hpp"
+#include "support/refusal.hpp"
+#include "support/rig.hpp"
+#include "ves/devices/net_ft.hpp"
+#include "ves/devices/net_ft_server.hpp"
+#include "ves/devices/on_bus.hpp"
+#include "ves/realtime/realtime.hpp"
+#include "ves/transport/channels.hpp"
+
+namespace ves::devices {
+namespace {
+
+using rdt_test::bytesOf;
+using rdt_test::Record;
+
+// --- Clocks --------------------------------------------------------------------------------------
+
+TEST(ClockOffset, TheTruthIsWithinItsUncertaintyWhateverTheDelays) {
+  constexpr std::int64_t kAhead = 7'123'456'789'000;
+  std::mt19937_64 random(3);
+  for (int trial = 0; trial < 200; ++trial) {
+    ClockOffset clock;
+    std::int64_t now = 1'000'000'000;
+    for (int i = 0; i < 50; ++i) {
+      const auto go = static_cast<std::int64_t>(random() % 5'000'000);
+      const auto wait = static_cast<std::int64_t>(random() % 3'000'000);
+      const auto come = static_cast<std::int64_t>(random() % 5'000'000);
+      const std::int64_t t1 = now, t2 = t1 + go + kAhead, t3 = t2 + wait, t4 = t3 - kAhead + come;
+      clock.take(t1, t2, t3, t4);
+      now = t4 + 1'000'000;
+      ASSERT_LE(std::abs(clock.offset(now) - kAhead), clock.uncertainty(now));
+    }
+    // The best of fifty: a round trip of 10 ms at most, of 1 or 2 ms among so many.
+    EXPECT_LT(clock.uncertainty(now), 2'000'000);
+  }
+}
+
+TEST(ClockOffset, OneClockIsTakenAsOneAndDriftWidensTheBounds) {
+  ClockOffset same;
+  EXPECT_EQ(same.uncertainty(5), -1);
+  EXPECT_EQ(same.offset(5), 0);
+  same.take(100'000, 180'000, 200'000, 220'000);  // 80 us there, 20 us back
+  EXPECT_EQ(same.offset(220'000), 0);
+  EXPECT_EQ(same.uncertainty(220'000), 50'000);
+  EXPECT_EQ(same.uncertainty(10'000'220'000), 50'000 + 1'000'000);  // 1e-4 of 10 s
+  // A worse round trip counts once the better one is old enough.
+  same.take(20'000'000'000, 20'000'900'000, 20'000'900'000, 20'001'800'000);
+  EXPECT_EQ(same.uncertainty(20'001'800'000), 900'000);
+}
+
+TEST(ClockOffset, WhatCannotBeCountsForNothing) {
+  ClockOffset clock;
+  clock.take(100, 200, 150, 300);                       // answered before it came
+  clock.take(300, 200, 210, 100);                       // heard before it was sent
+  clock.take(100, 200, 2000, 300);                      // took longer there than altogether
+  clock.take(INT64_MIN, INT64_MAX, INT64_MAX, INT64_MAX);
+  clock.take(-5, 0, 0, 5);
+  EXPECT_FALSE(clock.known());
+}
+
+// --- Following ---------------------------------------------------------------------------------
+
+TEST(Tracker, HasNoLagWhileTheAccelerationIsConstant) {
+  Tracker<1> tracker(60.0);
+  const auto x = [](double t) { return 0.3 - 0.2 * t + 0.5 * 0.7 * t * t; };
+  std::int64_t t = 0;
+  for (int i = 0; i < 600; ++i, t += 3'000'000)
+    tracker.take(Eigen::Matrix<double, 1, 1>(x(1e-9 * static_cast<double>(t))), t);
+  t += 1'000'000;
+  const auto m = tracker.at(t);
+  const double s = 1e-9 * static_cast<double>(t);
+  EXPECT_NEAR(m.x(0), x(s), 1e-9);
+  EXPECT_NEAR(m.v(0), -0.2 + 0.7 * s, 1e-8);
+  EXPECT_NEAR(m.a(0), 0.7, 1e-6);
+  // What is silent is at rest where it was going, not on its way to infinity.
+  const auto later = tracker.at(t + 60'000'000'000);
+  EXPECT_EQ(later.v(0), 0.0);
+  EXPECT_NEAR(later.x(0), x(s), 0.1);
+}
+
+// --- RDT ---------------------------------------------------------------------------------------
+
+/// Ten converter counts a newton, twenty a newton metre.
+Mat6 proc() {
+  Vec6 gain;
+  gain << 10, 10, 10, 20, 20, 20;
+  return gain.asDiagonal();
+}
+const NetFtCalibration kCalibration{1e6, 2e6, "FT27462"};
+
+struct Stream {
+  RdtStream stream{kCalibration, proc()};
+  std::int64_t now = 0;
+  void take(const Record& r) {
+    const auto bytes = bytesOf(r);
+    stream.take(bytes.data(), bytes.size(), ++now);
+  }
+  int fx() const {
+    WrenchReading w;
+    return stream.read(w) ? w.counts[0] : -1;
+  }
+};
+
+TEST(Rdt, CountsAreScaledByTheSensorsOwnCalibration) {
+  Stream s;
+  WrenchReading w;
+  EXPECT_FALSE(s.stream.read(w));
+  // 3 N, -5 N, 100 N; 1 N m, -2 N m, 0.03 N m
+  s.take({1, 9, 0, {3'000'000, -5'000'000, 100'000'000, 2'000'000, -4'000'000, 60'000}});
+  ASSERT_TRUE(s.stream.read(w));
+  EXPECT_EQ(w.counts, (std::array<std::int32_t, 6>{30, -50, 1000, 20, -40, 1}));
+  EXPECT_EQ(w.time, 1);
+  EXPECT_FALSE(w.fault);
+  // Beyond the 16 bits of the converter: its end, which the controller knows as saturated.
+  s.take({2, 10, 0, {2'147'483'647, -2'147'483'647 - 1, 0, 0, 0, 0}});
+  RdtStream steep(kCalibration, 100.0 * proc());
+  const auto bytes = bytesOf({1, 1, 0, {2'147'483'647, -2'147'483'647 - 1, 0, 0, 0, 0}});
+  steep.take(bytes.data(), bytes.size(), 1);
+  ASSERT_TRUE(steep.read(w));
+  EXPECT_EQ(w.counts[0], 32767);
+  EXPECT_EQ(w.counts[1], -32768);
+}
+
+TEST(Rdt, LossRepetitionDisorderAndTheWrapAreCounted) {
+  Stream s;
+  const auto record = [](std::uint32_t sequence, int newtons) {
+    return Record{sequence, sequence, 0, {newtons * 1'000'000, 0, 0, 0, 0, 0}};
+  };
+  s.take(record(0xfffffffd, 1));
+  s.take(record(0xfffffffe, 2));
+  s.take(record(1, 3));  // 0xffffffff and 0 lost, across the wrap
+  EXPECT_EQ(s.fx(), 30);
+  EXPECT_EQ(s.stream.counters().lost, 2);
+  s.take(record(1, 7));           // again
+  s.take(record(0xffffffff, 8));  // late
+  EXPECT_EQ(s.fx(), 30);
+  EXPECT_EQ(s.stream.counters().repeated, 1);
+  EXPECT_EQ(s.stream.counters().late, 1);
+  auto cut = bytesOf(record(2, 9));
+  cut.pop_back();
+  s.stream.take(cut.data(), cut.size(), 50);
+  EXPECT_EQ(s.stream.counters().malformed, 1);
+  EXPECT_EQ(s.fx(), 30);
+  WrenchReading w;
+  s.stream.read(w);
+  EXPECT_EQ(w.time, 3);  // of the record that counts
+  // A sensor that was switched off counts from one again, and is not believed until it is asked anew.
+  s.take(record(2, 4));
+  s.take(record(1, 5));
+  EXPECT_EQ(s.fx(), 40);
+  s.stream.restart();
+  s.take(record(1, 6));
+  EXPECT_EQ(s.fx(), 60);
+  EXPECT_EQ(s.stream.counters().records, 5);
+}
+
+TEST(Rdt, EveryErrorOfTheStatusIsAFaultAndTheThresholdsLatchIsNone) {
+  const auto fault = [](std::uint32_t status) {
+    Stream s;
+    s.take({1, 1, status, {}});
+    WrenchReading w;
+    return s.stream.read(w) && w.fault;
+  };
+  EXPECT_FALSE(fault(0));
+  EXPECT_FALSE(fault(0x00010000));
+  EXPECT_FALSE(fault(0x80010000));
+  EXPECT_TRUE(fault(0x80000000));
+  for (int bit = 0; bit < 31; ++bit) {
+    if (bit == 16) continue;
+    EXPECT_TRUE(fault(1u << bit)) << bit;
+    EXPECT_TRUE(fault(0x80010000u | 1u << bit)) << bit;
+  }
+}
+
+TEST(Rdt, CalibrationIsReadInTheSensorsUnitsOrRefusedByItsTag) {
+  const std::string good =
+      "<netft><cfgcalsn>FT1</cfgcalsn><scfgfu>N</scfgfu><scfgtu>Nm</scfgtu><cfgcpf>1000000</cfgcpf>"
+      "<cfgcpt>2000000</cfgcpt></netft>";
+  EXPECT_EQ(netFtCalibration(good), (NetFtCalibration{1e6, 2e6, "FT1"}));
+  const auto with = [&](const std::string& from, const std::string& to) {
+    std::string text = good;
+    text.replace(text.find(from), from.size(), to);
+    return text;
+  };
+  // One pound of force is 4.4482216152605 N, one pound foot 1.3558179483314 N m.
+  EXPECT_NEAR(netFtCalibration(with(">N<", ">lbf<")).counts_per_newton, 1e6 / 4.4482216152605, 1e-6);
+  EXPECT_NEAR(netFtCalibration(with(">Nm<", ">lbf-ft<")).counts_per_newton_metre,
+              2e6 / 1.3558179483314004, 1e-6);
+  EXPECT_NEAR(netFtCalibration(with(">Nm<", ">N-mm<")).counts_per_newton_metre, 2e9, 1e-3);
+  for (const auto& [text, tag] :
+       {std::pair{with("1000000", "0"), "cfgcpf"}, {with("1000000", "-1"), "cfgcpf"},
+        {with("1000000", "nan"), "cfgcpf"}, {with("1000000", "1e6x"), "cfgcpf"},
+        {with("2000000", ""), "cfgcpt"}, {with(">N<", ">stone<"), "scfgfu"},
+        {with("<scfgtu>", "<other>"), "scfgtu"}, {with("</cfgcalsn>", ""), "cfgcalsn"},
+        {std::string(), "cfgcpf"}})
+    EXPECT_NE(test::refusal([&, t = text] { netFtCalibration(t); }).find(tag), std::string::npos)
+        << text;
+}
+
+// --- The driver against a sensor written apart from it -------------------------------------------
+
+/// Reads until `done`, for at most ten seconds.
+template <typename Done>
+bool until(NetFt& driver, WrenchReading& w, Done done) {
+  const std::int64_t end = monotonicNow() + 10'000'000'000;
+  while (monotonicNow() < end) {
+    if (driver.read(w) && done()) return true;
+    usleep(500);
+  }
+  return false;
+}
+
+NetFtAddress addressOf(const rdt_test::Sensor& sensor) {
+  return {"127.0.0.1", sensor.port(), sensor.httpPort()};
+}
+
+TEST(NetFt, ReadsRecordsWithTheirTimeAsksAgainAndNeverTakesABias) {
+  rdt_test::Sensor sensor;
+  sensor.configure({});
+  WrenchReading w;
+  {
+    NetFt driver(addressOf(sensor), proc());
+    while (!sensor.streaming()) usleep(500);
+    EXPECT_FALSE(driver.read(w));
+    const std::int64_t before = monotonicNow();
+    sensor.send({41, 1, 0, {7'000'000, 0, 0, 0, 0, 0}});
+    ASSERT_TRUE(until(driver, w, [] { return true; }));
+    EXPECT_EQ(w.counts[0], 70);
+    EXPECT_GE(w.time, before - 1'000'000);
+    EXPECT_LE(w.time, monotonicNow());
+    // Switched off and on again: it counts from one, and knows of no client.
+    sensor.forgetClient();
+    const std::int64_t stamp = w.time;
+    while (!sensor.streaming()) {
+      driver.read(w);
+      EXPECT_EQ(w.time, stamp);  // what is old says so
+      usleep(500);
+    }
+    sensor.send({1, 1, 0, {8'000'000, 0, 0, 0, 0, 0}});
+    ASSERT_TRUE(until(driver, w, [&] { return w.counts[0] == 80; }));
+    sensor.send({2, 2, 0x80020000, {8'000'000, 0, 0, 0, 0, 0}});
+    ASSERT_TRUE(until(driver, w, [&] { return w.fault; }));
+    sensor.send({3, 3, 0, {9'000'000, 0, 0, 0, 0, 0}});
+    ASSERT_TRUE(until(driver, w, [&] { return w.counts[0] == 90; }));
+    EXPECT_FALSE(w.fault);
+    // Another tool was mounted, and its calibration chosen.
+    sensor.setHttpStatus(503);  // busy: no fault
+    sensor.configure({.serial = "FT99999"});
+    sensor.setHttpStatus(200);
+    ASSERT_TRUE(until(driver, w, [&] {
+      sensor.send({4, 4, 0, {}});
+      return w.fault;
+    }));
+  }
+  while (sensor.streaming()) usleep(500);  // it is told to stop
+  for (const int command : sensor.commands()) EXPECT_TRUE(command == 2 || command == 0) << command;
+}
+
+TEST(NetFt, WhoIsNoSensorIsRefusedInOneLine) {
+  rdt_test::Sensor sensor;
+  const auto refused = [&] {
+    return test::refusal([&] { NetFt driver(addressOf(sensor), proc()); });
+  };
+  sensor.setXml("<netft></netft>");
+  EXPECT_NE(refused().find("cfgcpf: missing"), std::string::npos) << refused();
+  sensor.configure({});
+  sensor.setHttpStatus(404);
+  EXPECT_NE(refused().find("answers 'HTTP/1.0 404"), std::string::npos) << refused();
+  sensor.setHttpStatus(200);
+  sensor.setXml(std::string(100'000, 'x'));
+  EXPECT_NE(refused().find("longer than 64 kB"), std::string::npos) << refused();
+  const NetFtAddress nobody{"127.0.0.1", 9, 9};
+  EXPECT_NE(test::refusal([&] { NetFt driver(nobody, proc()); }).find("127.0.0.1:9"),
+            std::string::npos);
+}
+
+// --- The server, read by bytes -------------------------------------------------------------------
+
+class Client {
+ public:
+  explicit Client(int port) : fd_(socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK, 0)) {
+    sockaddr_in to{};
+    to.sin_family = AF_INET;
+    to.sin_port = htons(static_cast<std::uint16_t>(port));
+    to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    connect(fd_, reinterpret_cast<sockaddr*>(&to), sizeof to);
+  }
+  ~Client() { close(fd_); }
+  void ask(std::uint8_t command, std::uint8_t count) {
+    const std::uint8_t request[] = {0x12, 0x34, 0, command, 0, 0, 0, count};
+    ASSERT_EQ(send(fd_, request, sizeof request, 0), 8);
+  }
+  /// Numbers of the next record, in order; empty: none.
+  std::vector<std::int64_t> next() {
+    std::uint8_t b[64];
+    if (recv(fd_, b, sizeof b, 0) != 36) return {};
+    std::vector<std::int64_t> out;
+    for (int i = 0; i < 9; ++i) {
+      const std::uint32_t n = static_cast<std::uint32_t>(b[4 * i]) << 24 | b[4 * i + 1] << 16 |
+                              b[4 * i + 2] << 8 | b[4 * i + 3];
+      out.push_back(i < 3 ? static_cast<std::int64_t>(n) : static_cast<std::int32_t>(n));
+    }
+    return out;
+  }
+
+ private:
+  int fd_;
+};
+
+TEST(NetFtServer, SendsEveryRecordThatIsDueAndSaysWhatItCannot) {
+  NetFtServer server({"127.0.0.1", 0, 0, 1000, {1e5, 2e5, "A1"}});
+  Client client(server.port());
+  server.set(Wrench{Vec3(1, -2, 3), Vec3(0.1, -0.2, 0.3)});
+  server.serve(1'000'000'000);
+  EXPECT_TRUE(client.next().empty());  // nobody has asked
+  client.ask(2, 0);
+  server.serve(1'010'000'000);  // ten of a thousand a second
+  for (std::int64_t i = 1; i <= 10; ++i) {
+    const auto r = client.next();
+    ASSERT_EQ(r.size(), 9u) << i;
+    EXPECT_EQ(r[0], i);
+    EXPECT_EQ(r[2], 0);
+    EXPECT_EQ(std::vector<std::int64_t>(r.begin() + 3, r.end()),
+              (std::vector<std::int64_t>{100'000, -200'000, 300'000, 20'000, -40'000, 60'000}));
+  }
+  EXPECT_TRUE(client.next().empty());
+  client.ask(0, 0);
+  server.serve(1'020'000'000);
+  EXPECT_TRUE(client.next().empty());
+  client.ask(2, 3);  // three, and no more
+  server.serve(1'030'000'000);
+  for (int i = 1; i <= 3; ++i) EXPECT_EQ(client.next().at(0), i);
+  EXPECT_TRUE(client.next().empty());
+  client.ask(0x42, 0);  // a bias of its own
+  client.ask(2, 1);
+  server.serve(1'040'000'000);
+  const auto unbiased = client.next();
+  ASSERT_EQ(unbiased.size(), 9u);
+  for (std::size_t i = 3; i < 9; ++i) EXPECT_EQ(unbiased[i], 0);
+  client.ask(2, 1);
+  server.set(Wrench{Vec3(1e6, 0, 0), Vec3(0, 0, 0)});  // more than 32 bits hold
+  server.serve(1'050'000'000);
+  EXPECT_EQ(client.next().at(2), 0x80020000);
+}
+
+TEST(NetFtServer, ItsPageIsWhatTheDriverReads) {
+  NetFtServer server({"127.0.0.1", 0, 0, 7000, {1e5, 2.5e5, "VES7"}});
+  std::jthread serving([&](std::stop_token stop) {
+    for (; !stop.stop_requested(); usleep(200)) server.serve(monotonicNow());
+  });
+  const std::string xml = fetchNetFtXml({"127.0.0.1", server.port(), server.httpPort()}, 2000);
+  EXPECT_EQ(netFtCalibration(xml), (NetFtCalibration{1e5, 2.5e5, "VES7"}));
+}
+
+// --- What the controller makes of it ----------------------------------------------------------------
+
+TEST(Pieces, OneThatIsTooOldOrAtFaultStopsTheRunByName) {
+  const auto stoppedBy = [](const std::function<void(Sample&)>& spoil) {
+    const Experiment e = test::experiment("z_sine");
+    Lockstep loop(e.controller, e.plant);
+    loop.step({Request::kStart, {}, {}});
+    for (int i = 0; i < 3000 && !test::done(loop.state()); ++i) {
+      if (i == 300) loop.disturb = spoil;
+      loop.step();
+    }
+    return loop.state().phase == Phase::kStopped ? loop.state().cause : Check::kCount;
+  };
+  constexpr std::int64_t kTick = 10'000'000;
+  const int most = test::experiment("z_sine").controller.safety.stale_ticks;
+  for (std::int64_t Sample::*stamp :
+       {&Sample::legs_time, &Sample::wrench_time, &Sample::joints_time}) {
+    EXPECT_EQ(stoppedBy([&](Sample& s) { s.*stamp = s.time - most * kTick; }), Check::kCount);
+    EXPECT_EQ(stoppedBy([&](Sample& s) { s.*stamp = s.time - most * kTick - 1'000; }), Check::kStale);
+    // From the future, or before the clock began: no sample of a machine, let in by nobody.
+    EXPECT_EQ(stoppedBy([&](Sample& s) { s.*stamp = s.time + 1; }), Check::kStale);
+    EXPECT_EQ(stoppedBy([&](Sample& s) { s.*stamp = -1; }), Check::kStale);
+  }
+  for (const std::uint32_t piece : {kLegsPiece, kSensorPiece, kRobotPiece})
+    EXPECT_EQ(stoppedBy([&](Sample& s) { s.faults = piece; }), Check::kDevice);
+  EXPECT_EQ(stoppedBy([&](Sample& s) { s.faults = 8; }), Check::kStale);  // nobody's bit
+}
+
+// --- A machine with drivers on the bus -----------------------------------------------------------
+
+class Composed : public testing::Test {
+ protected:
+  static void SetUpTestSuite() { enterPrivateBus(); }
+
+  static void publish(Bus& driver, const std::string& channel, sample_t m) {
+    m.header = header({5, 5}, ++sequence_, monotonicNow());
+    m.temperature = 20.0;
+    driver.publish(channel, m);
+  }
+  static void hear(Bus& bus, Machine& machine, const std::function<bool(const Sample&)>& done) {
+    for (int i = 0; i < 500; ++i) {
+      bus.wait(10);
+      machine.advance(i * 2'000'000, monotonicNow());
+      if (machine.sample() && done(*machine.sample())) return;
+    }
+    FAIL() << "waits for " << machine.waitsFor();
+  }
+  static inline std::int64_t sequence_ = 0;
+};
+
+TEST_F(Composed, EachPieceComesFromItsDriverAndTheRestIsSimulated) {
+  const Experiment alone = test::experiment("puma_on_table_4_1");
+  const setup_t setup = setupOf(alone, false, header({1, 1}, 0, 0));
+  plant::Plant simulated(alone.plant);
+  const Sample rest = simulated.sample();
+  const auto composed = [&](const std::string& piece, const std::string& channel) {
+    Bus bus(kDefaultUrl), driver(kDefaultUrl);
+    Machine machine(test::experiment("puma_on_table_4_1", {"machine." + piece + "=external"}), bus);
+    machine.advance(0, monotonicNow());
+    EXPECT_FALSE(machine.sample()) << piece;
+    EXPECT_FALSE(machine.waitsFor().empty());
+    sample_t m{};
+    std::copy_n(setup.leg_home, 6, m.legs);
+    for (int i = 0; i < 6; ++i) m.adc[i] = 11 * i + 5;
+    m.adc[6] = 777;
+    m.q[1] = 0.25;
+    m.switches = 1;
+    m.faults = static_cast<int>(kAllPieces);
+    const std::int64_t before = monotonicNow();
+    publish(driver, channel, m);
+    hear(bus, machine, [](const Sample&) { return true; });
+    machine.advance(2'000'000'000, monotonicNow());  // until the sensor's filter has settled
+    const Sample s = machine.sample().value_or(Sample());
+    EXPECT_GE(s.oldest(), 0);
+    EXPECT_LE(s.oldest(), monotonicNow() - before);
+    return s;
+  };
+  const std::array<std::int32_t, 6> theirs = {5, 16, 27, 38, 49, 60};
+  const auto wrenchIs = [](const Sample& s, const auto& wrench) {
+    return std::equal(wrench.begin(), wrench.begin() + 6, s.adc.begin());
+  };
+  const Sample legs = composed("legs", channel::kLegs);
+  EXPECT_TRUE(std::equal(legs.legs.begin(), legs.legs.end(), setup.leg_home));
+  EXPECT_EQ(legs.adc[6], 777);  // the pressure is the legs'
+  EXPECT_EQ(legs.q, rest.q);
+  EXPECT_EQ(legs.switches, kAllSwitchesClosed);
+  EXPECT_EQ(legs.faults, kLegsPiece);
+  const Sample sensor = composed("force_sensor", channel::kWrench);
+  EXPECT_TRUE(wrenchIs(sensor, theirs));
+  EXPECT_EQ(sensor.legs, rest.legs);
+  EXPECT_EQ(sensor.adc[6], rest.adc[6]);
+  EXPECT_EQ(sensor.faults, kSensorPiece);
+  const Sample robot = composed("robot", channel::kJoints);
+  EXPECT_EQ(robot.q(1), 0.25);
+  EXPECT_EQ(robot.legs, rest.legs);
+  EXPECT_EQ(robot.faults, kRobotPiece);
+  // The simulated sensor feels the weight of the robot where its joints really are.
+  EXPECT_FALSE(wrenchIs(robot, rest.adc));
+  const Sample switches = composed("switches", channel::kSwitches);
+  EXPECT_EQ(switches.switches, 1u);
+  EXPECT_EQ(switches.q, rest.q);
+  EXPECT_EQ(switches.faults, 0u);
+}
+
+TEST_F(Composed, ASilentPieceGrowsOldSilentSwitchesOpenAndAGhostIsNobody) {
+  Bus bus(kDefaultUrl), driver(kDefaultUrl);
+  Machine machine(test::experiment("z_sine", {"machine.force_sensor=external",
+                                              "machine.switches=external"}),
+                  bus);
+  sample_t m{};
+  m.adc[0] = 4;
+  m.switches = 3;
+  publish(driver, channel::kWrench, m);
+  publish(driver, channel::kSwitches, m);
+  hear(bus, machine, [](const Sample& s) { return s.switches == kAllSwitchesClosed; });
+  hear(bus, machine, [](const Sample& s) { return s.switches == 0; });
+  EXPECT_GE(machine.sample()->oldest(), SwitchesOnBus::kSilence - 10'000'000);
+  // Of an earlier process, and of an earlier sequence: nobody. Then its successor.
+  m.adc[0] = 9;
+  m.temperature = 20.0;
+  m.header = header({6, 4}, 1000, monotonicNow());
+  driver.publish(channel::kWrench, m);
+  m.header = header({5, 5}, 0, monotonicNow());
+  driver.publish(channel::kWrench, m);
+  m.adc[0] = 7;
+  m.header = header({6, 6}, 0, monotonicNow());
+  driver.publish(channel::kWrench, m);
+  hear(bus, machine, [](const Sample& s) { return s.adc[0] != 4; });
+  EXPECT_EQ(machine.sample()->adc[0], 7);
+}
+
+TEST_F(Composed, StampsOfAnotherHostsClockAreTheTimeOfArrival) {
+  Bus bus(kDefaultUrl), driver(kDefaultUrl);
+  Machine machine(test::experiment("z_sine", {"machine.robot=external"}), bus);
+  for (const std::int64_t off : {-3'600'000'000'000, 3'600'000'000'000}) {
+    sample_t m{};
+    m.q[0] = off > 0 ? 0.1 : 0.2;
+    m.temperature = 20.0;
+    m.header = header({5, 5}, ++sequence_, monotonicNow() + off);
+    const std::int64_t before = monotonicNow();
+    driver.publish(channel::kJoints, m);
+    hear(bus, machine, [&](const Sample& s) { return s.q(0) == m.q[0]; });
+    EXPECT_GE(machine.sample()->joints_time, before - 1'000'000);
+    EXPECT_LE(machine.sample()->joints_time, monotonicNow());
+  }
+}
+
+TEST(RealLegs, CarryThePlatformOfTheSimulatedRobot) {
+  const Experiment e = test::experiment("puma_on_table_4_1");
+  const Geometry& g = e.controller.geometry;
+  plant::Plant plant(e.plant);
+  Tracker<kLegs> tracker(e.machine.follow);
+  // Read to the count every 2 ms while the platform goes z = 20 mm sin(2 pi t).
+  constexpr double kAmplitude = 0.02, kOmega = 2.0 * M_PI;
+  double position = 0.0, square = 0.0;  // [m], [m^2/s^4] off
+  for (int i = 1; i <= 1500; ++i) {
+    const std::int64_t now = i * 2'000'000LL;
+    const double z = kAmplitude * std::sin(kOmega * 1e-9 * static_cast<double>(now));
+    const Vec6 L = legLengths(g, g.fromHome(Pose{Vec3(0.0, 0.0, z), Vec3::Zero()}));
+    tracker.take(legLengths(e.controller.legs, legCounts(e.controller.legs, L)), now);
+    const auto m = tracker.at(now);
+    plant.follow(LegMotion{m.x, m.v, m.a});
+    plant.advance(now);
+    plant.sample();
+    if (i < 300) continue;
+    position = std::max(position, std::abs(plant.truth().x.p.z() - z));
+    square += std::pow(plant.truth().P.a.z() + kOmega * kOmega * z, 2) / 1201.0;
+  }
+  EXPECT_LT(position, 2.0 * e.controller.legs.scale(0));
+  // A count is 70 um: its second derivative is rough, and its smoothing late.
+  EXPECT_LT(std::sqrt(square), 0.25 * kAmplitude * kOmega * kOmega);
+}
+
+}  // namespace
+}  // namespace ves::devices
