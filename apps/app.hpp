@@ -136,8 +136,8 @@ struct Options {
     Experiment experiment =
         loadExperiment(findScenario(scenario, configFolder()), all, calibration, masses, servo);
     if (!experiment.key_file.empty() && BusAddress(process.url).key_file.empty())
-      process.url += (process.url.find('?') == std::string::npos ? "?key=" : "&key=") +
-                     experiment.key_file;
+      process.url +=
+          (process.url.find('?') == std::string::npos ? "?key=" : "&key=") + experiment.key_file;
     return experiment;
   }
 };

@@ -30,8 +30,7 @@ class RecordedWrench {
       all_.push_back({truth->header.time_ns, reading(*truth).stacked()});
     }
     printDamage(damage_);
-    if (all_.empty())
-      throw InputError(fmt::format("{}: no {} in this log", log, channel::kTruth));
+    if (all_.empty()) throw InputError(fmt::format("{}: no {} in this log", log, channel::kTruth));
   }
 
   /// `since` [ns] the first sample.
@@ -69,11 +68,12 @@ void announce(const NetFtServer& server, const NetFtServer::Options& options) {
 
 void serveLog(NetFtServer& server, RecordedWrench& wrench) {
   const std::int64_t start = monotonicNow();
-  for (std::int64_t now = start; !stop_requested && now - start <= wrench.duration();
-       now = monotonicNow()) {
-    server.set(wrench.at(now - start));
-    server.serve(now);
-    sleepUntil(server.due());
+  // Record by record, each as of the moment when it is due.
+  for (std::int64_t due = start; !stop_requested && due - start <= wrench.duration();
+       due = server.due()) {
+    sleepUntil(due);
+    server.set(wrench.at(due - start));
+    server.serve(due);
   }
 }
 
@@ -117,9 +117,9 @@ int netftServerCommand(int argc, char** argv) {
       ->capture_default_str();
   cli.add_option("--serial", options.calibration.serial, "of the calibration")
       ->check([](const std::string& text) {
-        const bool plain = !text.empty() && text.size() < 32 &&
-                           std::all_of(text.begin(), text.end(),
-                                       [](unsigned char c) { return std::isalnum(c); });
+        const bool plain =
+            !text.empty() && text.size() < 32 &&
+            std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isalnum(c); });
         return plain ? std::string() : fmt::format("'{}', want letters and digits", text);
       });
   addUrl(cli, url);

@@ -7,9 +7,10 @@
 namespace ves::app {
 
 int plantCommand(int argc, char** argv) {
-  CLI::App cli("The machine as a process: legs, platform, robot, sensor; simulated, or as the scenario's "
+  CLI::App cli(
+      "The machine as a process: legs, platform, robot, sensor; simulated, or as the scenario's "
       "`machine` says. Runs until Ctrl-C.",
-               "ves plant");
+      "ves plant");
   Options options;
   options.addExperiment(cli);
   options.addBus(cli);

@@ -61,9 +61,9 @@ TEST(ClockOffset, OneClockIsTakenAsOneAndDriftWidensTheBounds) {
 
 TEST(ClockOffset, WhatCannotBeCountsForNothing) {
   ClockOffset clock;
-  clock.take(100, 200, 150, 300);                       // answered before it came
-  clock.take(300, 200, 210, 100);                       // heard before it was sent
-  clock.take(100, 200, 2000, 300);                      // took longer there than altogether
+  clock.take(100, 200, 150, 300);   // answered before it came
+  clock.take(300, 200, 210, 100);   // heard before it was sent
+  clock.take(100, 200, 2000, 300);  // took longer there than altogether
   clock.take(INT64_MIN, INT64_MAX, INT64_MAX, INT64_MAX);
   clock.take(-5, 0, 0, 5);
   EXPECT_FALSE(clock.known());
@@ -155,7 +155,8 @@ TEST(Rdt, LossRepetitionDisorderAndTheWrapAreCounted) {
   WrenchReading w;
   s.stream.read(w);
   EXPECT_EQ(w.time, 3);  // of the record that counts
-  // A sensor that was switched off counts from one again, and is not believed until it is asked anew.
+  // A sensor that was switched off counts from one again, and is not believed until it is asked
+  // anew.
   s.take(record(2, 4));
   s.take(record(1, 5));
   EXPECT_EQ(s.fx(), 40);
@@ -194,16 +195,20 @@ TEST(Rdt, CalibrationIsReadInTheSensorsUnitsOrRefusedByItsTag) {
     return text;
   };
   // One pound of force is 4.4482216152605 N, one pound foot 1.3558179483314 N m.
-  EXPECT_NEAR(netFtCalibration(with(">N<", ">lbf<")).counts_per_newton, 1e6 / 4.4482216152605, 1e-6);
+  EXPECT_NEAR(netFtCalibration(with(">N<", ">lbf<")).counts_per_newton, 1e6 / 4.4482216152605,
+              1e-6);
   EXPECT_NEAR(netFtCalibration(with(">Nm<", ">lbf-ft<")).counts_per_newton_metre,
               2e6 / 1.3558179483314004, 1e-6);
   EXPECT_NEAR(netFtCalibration(with(">Nm<", ">N-mm<")).counts_per_newton_metre, 2e9, 1e-3);
-  for (const auto& [text, tag] :
-       {std::pair{with("1000000", "0"), "cfgcpf"}, {with("1000000", "-1"), "cfgcpf"},
-        {with("1000000", "nan"), "cfgcpf"}, {with("1000000", "1e6x"), "cfgcpf"},
-        {with("2000000", ""), "cfgcpt"}, {with(">N<", ">stone<"), "scfgfu"},
-        {with("<scfgtu>", "<other>"), "scfgtu"}, {with("</cfgcalsn>", ""), "cfgcalsn"},
-        {std::string(), "cfgcpf"}})
+  for (const auto& [text, tag] : {std::pair{with("1000000", "0"), "cfgcpf"},
+                                  {with("1000000", "-1"), "cfgcpf"},
+                                  {with("1000000", "nan"), "cfgcpf"},
+                                  {with("1000000", "1e6x"), "cfgcpf"},
+                                  {with("2000000", ""), "cfgcpt"},
+                                  {with(">N<", ">stone<"), "scfgfu"},
+                                  {with("<scfgtu>", "<other>"), "scfgtu"},
+                                  {with("</cfgcalsn>", ""), "cfgcalsn"},
+                                  {std::string(), "cfgcpf"}})
     EXPECT_NE(test::refusal([&, t = text] { netFtCalibration(t); }).find(tag), std::string::npos)
         << text;
 }
@@ -363,7 +368,8 @@ TEST(NetFtServer, ItsPageIsWhatTheDriverReads) {
   EXPECT_EQ(netFtCalibration(xml), (NetFtCalibration{1e5, 2.5e5, "VES7"}));
 }
 
-// --- What the controller makes of it ----------------------------------------------------------------
+// --- What the controller makes of it
+// ----------------------------------------------------------------
 
 TEST(Pieces, OneThatIsTooOldOrAtFaultStopsTheRunByName) {
   const auto stoppedBy = [](const std::function<void(Sample&)>& spoil) {
@@ -381,7 +387,8 @@ TEST(Pieces, OneThatIsTooOldOrAtFaultStopsTheRunByName) {
   for (std::int64_t Sample::*stamp :
        {&Sample::legs_time, &Sample::wrench_time, &Sample::joints_time}) {
     EXPECT_EQ(stoppedBy([&](Sample& s) { s.*stamp = s.time - most * kTick; }), Check::kCount);
-    EXPECT_EQ(stoppedBy([&](Sample& s) { s.*stamp = s.time - most * kTick - 1'000; }), Check::kStale);
+    EXPECT_EQ(stoppedBy([&](Sample& s) { s.*stamp = s.time - most * kTick - 1'000; }),
+              Check::kStale);
     // From the future, or before the clock began: no sample of a machine, let in by nobody.
     EXPECT_EQ(stoppedBy([&](Sample& s) { s.*stamp = s.time + 1; }), Check::kStale);
     EXPECT_EQ(stoppedBy([&](Sample& s) { s.*stamp = -1; }), Check::kStale);
@@ -469,9 +476,9 @@ TEST_F(Composed, EachPieceComesFromItsDriverAndTheRestIsSimulated) {
 
 TEST_F(Composed, ASilentPieceGrowsOldSilentSwitchesOpenAndAGhostIsNobody) {
   Bus bus(kDefaultUrl), driver(kDefaultUrl);
-  Machine machine(test::experiment("z_sine", {"machine.force_sensor=external",
-                                              "machine.switches=external"}),
-                  bus);
+  Machine machine(
+      test::experiment("z_sine", {"machine.force_sensor=external", "machine.switches=external"}),
+      bus);
   sample_t m{};
   m.adc[0] = 4;
   m.switches = 3;

@@ -111,7 +111,8 @@ TEST(Replay, NothingOlderOfASenderIsTakenAgain) {
   EXPECT_FALSE(fresh("VES_SAMPLE", 1, 6, 0));
 }
 
-// --- Both ends of a bus with a key -----------------------------------------------------------------
+// --- Both ends of a bus with a key
+// -----------------------------------------------------------------
 
 class KeyedBus : public testing::Test {
  protected:
@@ -179,7 +180,7 @@ TEST_F(KeyedBus, CommandsAndOrdersThatAreForgedAlteredOrReplayedAreIgnored) {
   controller.publish(channel::kLegCommand, command(0, 0));  // hello: it does not know us yet
   settle({&machine});
   EXPECT_FALSE(link.takeCommand());
-  EXPECT_EQ(link.lastHeard().source, 9);  // and our samples will say so
+  EXPECT_EQ(link.lastHeard().source, 9);                    // and our samples will say so
   controller.publish(channel::kLegCommand, command(1, 4));  // a recording, for an earlier machine
   settle({&machine});
   EXPECT_FALSE(link.takeCommand());
@@ -192,7 +193,8 @@ TEST_F(KeyedBus, CommandsAndOrdersThatAreForgedAlteredOrReplayedAreIgnored) {
   EXPECT_EQ(link.takeRobotOrders().size(), 1u);
   ASSERT_EQ(heard.size(), 7u);
 
-  stranger.publish(channel::kLegCommand, command(1'000'000, 3));  // the live source and epoch, forged
+  stranger.publish(channel::kLegCommand,
+                   command(1'000'000, 3));  // the live source and epoch, forged
   std::mt19937 random(1);
   for (int i = 0; i < 500; ++i) {
     auto [channel, bytes] = heard[random() % heard.size()];
@@ -245,10 +247,11 @@ TEST(Bus, AddressesAreReadWholeOrRefused) {
   EXPECT_EQ(all.key_file, "/a b/c.key");
   EXPECT_EQ(all.lcm, "udpm://239.255.76.67:7667?ttl=3");
   EXPECT_EQ(BusAddress("udpm://239.255.76.67:7667?key=k&ttl=1").key_file, "k");
-  for (const char* bad : {"", "udpm://1.2.3.4:7667", "udpm://239.255.76.67", "udpm://239.255.76.67:0",
-                          "udpm://239.255.76.67:7667?", "udpm://239.255.76.67:7667?ttl=",
-                          "udpm://239.255.76.67:7667?ttl=-1", "udpm://239.255.76.67:7667?ttl=256",
-                          "udpm://239.255.76.67:7667?ttl=1x", "udpm://239.255.76.67:7667&ttl=1",
+  for (const char* bad : {"", "udpm://1.2.3.4:7667", "udpm://239.255.76.67",
+                          "udpm://239.255.76.67:0", "udpm://239.255.76.67:7667?",
+                          "udpm://239.255.76.67:7667?ttl=", "udpm://239.255.76.67:7667?ttl=-1",
+                          "udpm://239.255.76.67:7667?ttl=256", "udpm://239.255.76.67:7667?ttl=1x",
+                          "udpm://239.255.76.67:7667&ttl=1",
                           "udpm://239.255.76.67:7667?ttl=1?key=k", "udpm://239.255.76.67:7667?key=",
                           "udpm://239.255.76.67:7667?size=1", "udpm://239.255.76.67:7667x"})
     EXPECT_NE(test::refusal([&] { BusAddress address(bad); }).find("want udpm://"),
@@ -259,7 +262,8 @@ TEST(Bus, AddressesAreReadWholeOrRefused) {
   EXPECT_NE(openBusWarning("udpm://239.255.76.67:7667?ttl=1"), "");
 }
 
-// --- A whole run under attack -------------------------------------------------------------------------
+// --- A whole run under attack
+// -------------------------------------------------------------------------
 
 class KeyedRun : public test::Programs {};
 
@@ -288,7 +292,8 @@ TEST_F(KeyedRun, ParksAndReplaysWhileEverythingOnTheBusIsForgedAlteredAndReplaye
       }
       auto [channel, bytes] = heard[random() % heard.size()];
       if (channel == channel::kSample && i % 3 == 0) channel = channel::kLegCommand;
-      if (i % 4 == 1) bytes[random() % bytes.size()] ^= static_cast<std::uint8_t>(1 + random() % 255);
+      if (i % 4 == 1)
+        bytes[random() % bytes.size()] ^= static_cast<std::uint8_t>(1 + random() % 255);
       if (i % 4 == 2 && bytes.size() > 23) bytes[20] = 0x7f;  // far ahead, by the live source
       raw.publish(channel, bytes.data(), static_cast<unsigned>(bytes.size()));
     }

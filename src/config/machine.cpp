@@ -86,6 +86,7 @@ MachineConfig readMachine(Section s) {
   m.net_ft.port = static_cast<int>(net_ft.integer("port", 1, 65535));
   m.net_ft.http_port = static_cast<int>(net_ft.integer("http_port", 1, 65535));
   net_ft.finish();
+  m.period = s.integer("sample_period_ns", 200'000, 100'000'000);
   m.follow = s.number("follow_per_s", 1.0, 1e4);
   s.finish();
   return m;

@@ -55,8 +55,7 @@ void Machine::advance(std::int64_t until, std::int64_t now) noexcept {
   if (!real_legs_) simulation_.legs().read(legs);
   if (!real_robot_) simulation_.robot().read(joints);
   WrenchReading wrench;
-  if (!(real_sensor_ ? *real_sensor_ : simulation_.sensor()).read(wrench))
-    wait("the force sensor");
+  if (!(real_sensor_ ? *real_sensor_ : simulation_.sensor()).read(wrench)) wait("the force sensor");
   std::uint32_t switches = 0;
   if (!(real_switches_ ? *real_switches_ : simulation_.switches()).read(switches))
     wait("the safety loops (VES_SWITCHES)");

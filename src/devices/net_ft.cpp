@@ -19,8 +19,8 @@
 namespace ves::devices {
 namespace {
 
-constexpr int kPatience = 2000;                    // [ms] for the sensor's web page
-constexpr std::int64_t kSilence = 500'000'000;     // [ns]
+constexpr int kPatience = 2000;                     // [ms] for the sensor's web page
+constexpr std::int64_t kSilence = 500'000'000;      // [ns]
 constexpr std::int64_t kLookAgain = 1'000'000'000;  // [ns] at the calibration
 
 struct Descriptor {
@@ -43,8 +43,8 @@ int connected(const NetFtAddress& address, int port, int type) {
   const int error = getaddrinfo(address.host.c_str(), std::to_string(port).c_str(), &hints, &found);
   if (error) throw InputError(fmt::format("{}: {}", nameOf(address, port), gai_strerror(error)));
   const std::unique_ptr<addrinfo, void (*)(addrinfo*)> owner(found, freeaddrinfo);
-  const int fd =
-      socket(found->ai_family, found->ai_socktype | SOCK_CLOEXEC | SOCK_NONBLOCK, found->ai_protocol);
+  const int fd = socket(found->ai_family, found->ai_socktype | SOCK_CLOEXEC | SOCK_NONBLOCK,
+                        found->ai_protocol);
   if (fd < 0 || (connect(fd, found->ai_addr, found->ai_addrlen) != 0 && errno != EINPROGRESS)) {
     const int why = errno;
     if (fd >= 0) close(fd);
@@ -86,8 +86,8 @@ std::string fetchNetFtXml(const NetFtAddress& address, int patience) {
     if (answer.size() > kLongest) fail("longer than 64 kB");
   }
   if (answer.rfind("HTTP/1.", 0) != 0 || answer.substr(8, 4) != " 200")
-    fail(fmt::format("answers '{}'", answer.substr(0, std::min<std::size_t>(
-                                                          answer.find_first_of("\r\n"), 60))));
+    fail(fmt::format("answers '{}'",
+                     answer.substr(0, std::min<std::size_t>(answer.find_first_of("\r\n"), 60))));
   return answer;
 }
 

@@ -43,10 +43,7 @@ int bound(const std::string& address, int& port, int type) {
 }  // namespace
 
 NetFtServer::NetFtServer(const Options& options)
-    : options_(options),
-      port_(options.port),
-      http_port_(options.http_port),
-      period_(1'000'000'000 / options.rate) {
+    : options_(options), port_(options.port), http_port_(options.http_port) {
   records_ = bound(options.address, port_, SOCK_DGRAM);
   try {
     pages_ = bound(options.address, http_port_, SOCK_STREAM);
@@ -72,9 +69,11 @@ void NetFtServer::serve(std::int64_t now) {
   constexpr std::int64_t kMade = 100'000'000;  // [ns] that are made up for
   takeRequests();
   answerPage();
-  if (due_ == 0) due_ = now;
-  due_ = std::max(due_, now - kMade);
-  for (; due_ <= now; due_ += period_) sendRecord();
+  if (start_ == 0 || now - due() > kMade) {
+    start_ = now;
+    moments_ = 0;
+  }
+  for (; due() <= now; ++moments_) sendRecord();
 }
 
 void NetFtServer::takeRequests() {
@@ -108,7 +107,8 @@ void NetFtServer::answerPage() {
     const bool known = asked.rfind("GET /netftapi2.xml", 0) == 0;
     const std::string body = known ? netFtXml(options_.calibration, options_.rate) : "not here\n";
     const std::string answer = fmt::format(
-        "HTTP/1.0 {}\r\nContent-Type: text/xml\r\nContent-Length: {}\r\nConnection: close\r\n\r\n{}",
+        "HTTP/1.0 {}\r\nContent-Type: text/xml\r\nContent-Length: {}\r\nConnection: "
+        "close\r\n\r\n{}",
         known ? "200 OK" : "404 Not Found", body.size(), body);
     send(fd, answer.data(), answer.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
   }

@@ -46,19 +46,25 @@ struct Unit {
   double si;  // [N | N m]
 };
 constexpr double kPound = 4.4482216152605, kFoot = 0.3048, kKilogram = 9.80665;
-constexpr Unit kForces[] = {{"N", 1.0},     {"kN", 1e3},       {"lbf", kPound},
-                            {"lb", kPound}, {"klbf", 1e3 * kPound}, {"kgf", kKilogram},
-                            {"kg", kKilogram}, {"gf", 1e-3 * kKilogram}, {"g", 1e-3 * kKilogram}};
+constexpr Unit kForces[] = {{"N", 1.0},
+                            {"kN", 1e3},
+                            {"lbf", kPound},
+                            {"lb", kPound},
+                            {"klbf", 1e3 * kPound},
+                            {"kgf", kKilogram},
+                            {"kg", kKilogram},
+                            {"gf", 1e-3 * kKilogram},
+                            {"g", 1e-3 * kKilogram}};
 constexpr Unit kTorques[] = {{"Nm", 1.0},
                              {"N-m", 1.0},
                              {"Nmm", 1e-3},
                              {"N-mm", 1e-3},
                              {"kNm", 1e3},
                              {"kN-m", 1e3},
-                             {"lbf-in", kPound * kFoot / 12.0},
-                             {"lb-in", kPound * kFoot / 12.0},
-                             {"lbf-ft", kPound * kFoot},
-                             {"lb-ft", kPound * kFoot},
+                             {"lbf-in", kPound* kFoot / 12.0},
+                             {"lb-in", kPound* kFoot / 12.0},
+                             {"lbf-ft", kPound* kFoot},
+                             {"lb-ft", kPound* kFoot},
                              {"kgf-cm", 1e-2 * kKilogram},
                              {"kg-cm", 1e-2 * kKilogram}};
 
@@ -159,8 +165,7 @@ void RdtStream::take(const std::uint8_t* data, std::size_t size, std::int64_t ti
 bool RdtStream::read(WrenchReading& out) const noexcept {
   if (!any_) return false;
   Vec6 counts;
-  for (int i = 0; i < kWrenchChannels; ++i)
-    counts(i) = newest_.counts[static_cast<std::size_t>(i)];
+  for (int i = 0; i < kWrenchChannels; ++i) counts(i) = newest_.counts[static_cast<std::size_t>(i)];
   const Vec6 converter = counts_per_count_ * counts;
   for (int i = 0; i < kWrenchChannels; ++i)
     out.counts[static_cast<std::size_t>(i)] =

@@ -28,6 +28,8 @@ std::vector<FaultRow> scenarioRows(const std::filesystem::path& config);
 std::vector<FaultRow> operatorRows(const std::filesystem::path& config);
 /// Files, logs and messages that are wrong.
 std::vector<FaultRow> inputRows(const std::filesystem::path& config);
+/// A force sensor over the network that loses, repeats, fails.
+std::vector<FaultRow> sensorRows(const std::filesystem::path& config);
 /// Controller and plant as processes on a bus.
 std::vector<FaultRow> processRows(const std::filesystem::path& config,
                                   const std::filesystem::path& program);

@@ -24,7 +24,7 @@ std::vector<FaultRow> faultTable(const std::filesystem::path& config,
                                  const std::filesystem::path& program) {
   std::vector<FaultRow> rows;
   for (auto& part : {scenarioRows(config), operatorRows(config), inputRows(config),
-                     processRows(config, program)})
+                     sensorRows(config), processRows(config, program)})
     rows.insert(rows.end(), part.begin(), part.end());
   std::sort(rows.begin(), rows.end(), before);
   return rows;

@@ -194,7 +194,15 @@ void addTiming(const Series& series, nlohmann::ordered_json& out) {
   write("stage_send", &timing_t::send_ns);
   write("stage_tell", &timing_t::tell_ns);
   write("sample_age", &timing_t::sample_age_ns);
+  write("legs_age", &timing_t::legs_age_ns);
+  write("wrench_age", &timing_t::wrench_age_ns);
+  write("joints_age", &timing_t::joints_age_ns);
   write("sample_to_command", &timing_t::sample_to_command_ns);
+  if (last->clock_uncertainty_ns >= 0) {
+    out["clock_offset_s"] = static_cast<double>(last->clock_offset_ns) * kSecondPerNanosecond;
+    out["clock_uncertainty_s"] =
+        static_cast<double>(last->clock_uncertainty_ns) * kSecondPerNanosecond;
+  }
   // Counts below 1, 2, 4, .. us, the last bin everything beyond.
   out["wake_up_late_histogram"] = last->late;
   out["tick_compute_histogram"] = last->compute;
@@ -206,6 +214,7 @@ void addTiming(const Series& series, nlohmann::ordered_json& out) {
   out["samples_rejected"] = Rejections{last->samples_malformed, last->samples_out_of_range,
                                        last->samples_of_another, last->samples_old}
                                 .text();
+  out["messages_ignored"] = Refused{last->messages_forged, last->messages_replayed}.text();
 }
 
 }  // namespace
@@ -347,6 +356,18 @@ std::string table(const nlohmann::ordered_json& s) {
         number("wake_up_late_median_s") * 1e6, number("wake_up_late_p99_s") * 1e6,
         number("wake_up_late_max_s") * 1e6, number("tick_compute_median_s") * 1e6,
         number("tick_compute_p99_s") * 1e6, number("sample_age_median_s") * 1e3);
+    constexpr double kAlike = 1e-4;  // [s]
+    const double age = number("sample_age_median_s");
+    bool apart = false;
+    for (const char* piece : {"legs", "wrench", "joints"})
+      apart = apart || std::abs(number(piece + std::string("_age_median_s")) - age) > kAlike;
+    if (apart)
+      out += fmt::format("           legs {:.1f} ms old, wrench {:.1f}, joints {:.1f}\n",
+                         number("legs_age_median_s") * 1e3, number("wrench_age_median_s") * 1e3,
+                         number("joints_age_median_s") * 1e3);
+    if (s.contains("clock_offset_s") && number("clock_offset_s") != 0.0)
+      out += fmt::format("           the machine's clock is {:.6f} s ahead of ours, +-{:.2f} ms\n",
+                         number("clock_offset_s"), number("clock_uncertainty_s") * 1e3);
     const auto missed = s["ticks_missed"].get<std::int64_t>();
     out += missed == 0 ? "           no tick missed\n"
                        : fmt::format(

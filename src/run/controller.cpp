@@ -1,21 +1,21 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
+#include "process_conduct.hpp"
 #include "ves/realtime/latency.hpp"
 #include "ves/realtime/realtime.hpp"
 #include "ves/run/announcer.hpp"
 #include "ves/run/flight_record.hpp"
 #include "ves/run/run.hpp"
 #include "ves/run/run_monitor.hpp"
-#include "process_conduct.hpp"
 #include "ves/transport/channels.hpp"
 
 namespace ves {
 namespace {
 
-constexpr int kControllerPriority = 80;             // [-] SCHED_FIFO
-constexpr int kAnswerTime = 200;                    // [ms] lockstep, before a message is repeated
-constexpr int kAnswerTries = 50;                    // [-] before the other side counts as gone
+constexpr int kControllerPriority = 80;  // [-] SCHED_FIFO
+constexpr int kAnswerTime = 200;         // [ms] lockstep, before a message is repeated
+constexpr int kAnswerTries = 50;         // [-] before the other side counts as gone
 constexpr std::int64_t kFirstSampleTime = 10'000'000'000;  // [ns]
 constexpr std::int64_t kWorthAWord = 2'000'000'000;        // [ns]
 
@@ -140,9 +140,8 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
     }
     const std::string why = notLetIn(link, bus);
     if (monotonicNow() - start > kFirstSampleTime)
-      throw InputError(fmt::format(
-          "bus {}: no machine to be heard{}", options.url,
-          why.empty() ? "" : "; " + why));
+      throw InputError(fmt::format("bus {}: no machine to be heard{}", options.url,
+                                   why.empty() ? "" : "; " + why));
     // Who is here: on a bus with a key a machine is believed when it answers.
     link.send(toMessage(LegCommand(), header(self, -1, monotonicNow())));
     bus.wait(100);

@@ -10,9 +10,8 @@
 namespace ves {
 namespace {
 
-constexpr int kMachinePriority = 70;                // [-] SCHED_FIFO
-constexpr std::int64_t kMachinePeriod = 2'000'000;  // [ns] between its samples, real time
-constexpr std::int64_t kLongestLeap = 100'000'000;  // [-] ticks that a command may pass over
+constexpr int kMachinePriority = 70;                 // [-] SCHED_FIFO
+constexpr std::int64_t kLongestLeap = 100'000'000;   // [-] ticks that a command may pass over
 constexpr std::int64_t kWorthAWord = 2'000'000'000;  // [ns]
 
 /// The machine on its bus.
@@ -97,8 +96,7 @@ void MachineProcess::inLockstep(const std::function<bool()>& stop) {
     }
     if (tick == answered) {
       bus_.publish(channel::kSample, last);
-    } else if (tick == -1 ||
-               (answered > -2 && tick > answered && tick - answered < kLongestLeap)) {
+    } else if (tick == -1 || (answered > -2 && tick > answered && tick - answered < kLongestLeap)) {
       std::int64_t until = plant().time();
       if (tick >= 0) {
         machine_.command(legs);
@@ -114,7 +112,7 @@ void MachineProcess::inLockstep(const std::function<bool()>& stop) {
 void MachineProcess::inRealTime(const std::function<bool()>& stop) {
   enableRealtime("plant", kMachinePriority, options_.realtime);
   const std::int64_t start = monotonicNow();
-  Ticker ticker(kMachinePeriod);
+  Ticker ticker(experiment_.machine.period);
   bool told = false;
   while (!stop()) {
     ticker.wait();

@@ -260,16 +260,16 @@ void ControllerLink::send(leg_command_t command) noexcept {
 }
 
 PlantLink::PlantLink(Bus& bus, const Identity& self) : bus_(bus), self_(self) {
-  bus.subscribe(channel::kLegCommand,
-                [this](const std::string&, const void* data, std::uint32_t size) {
-                  const auto message = decode<leg_command_t>(data, size);
-                  const auto command = message ? fromMessage(*message) : std::nullopt;
-                  if (!command || !mayCommand(message->header, message->machine, command->engaged)) {
-                    ++rejected_;
-                    return;
-                  }
-                  command_ = {*command, message->header.sequence};
-                });
+  bus.subscribe(
+      channel::kLegCommand, [this](const std::string&, const void* data, std::uint32_t size) {
+        const auto message = decode<leg_command_t>(data, size);
+        const auto command = message ? fromMessage(*message) : std::nullopt;
+        if (!command || !mayCommand(message->header, message->machine, command->engaged)) {
+          ++rejected_;
+          return;
+        }
+        command_ = {*command, message->header.sequence};
+      });
   bus.subscribe(channel::kRobot, [this](const std::string&, const void* data, std::uint32_t size) {
     const auto message = decode<robot_command_t>(data, size);
     const auto order = message ? fromMessage(*message) : std::nullopt;
@@ -292,7 +292,8 @@ bool PlantLink::mayCommand(const header_t& from, std::int64_t machine, bool enga
     // Others wait until the master lets go or falls silent. A controller that is not engaged asks
     // for nothing, and takes nothing over from one that is.
     if (engaged_ && now_ - heard_ < kSilence) return false;
-    last_heard_ = {from.source, from.sequence, bus_.arrival()};  // who says hello, and does not know us
+    last_heard_ = {from.source, from.sequence,
+                   bus_.arrival()};  // who says hello, and does not know us
     if (!means(machine)) return false;
     if (from.epoch < master_.epoch) return false;  // a ghost: a log played, a process left behind
     master_ = {from.source, from.epoch};

@@ -25,7 +25,8 @@ namespace {
 /// An open file that goes with its scope.
 struct File {
   int descriptor = -1;
-  File(const std::string& name, int flags) : descriptor(open(name.c_str(), flags | O_CLOEXEC, 0600)) {}
+  File(const std::string& name, int flags)
+      : descriptor(open(name.c_str(), flags | O_CLOEXEC, 0600)) {}
   ~File() {
     if (descriptor >= 0) close(descriptor);
   }

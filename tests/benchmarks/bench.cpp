@@ -326,7 +326,8 @@ void LockstepDemoOverTheBus(benchmark::State& state) {
 }
 BENCHMARK(LockstepDemoOverTheBus)->UseRealTime()->Iterations(1)->Unit(benchmark::kMillisecond);
 
-/// What a key costs the controller in a tick: command, state and timing signed, five samples checked.
+/// What a key costs the controller in a tick: command, state and timing signed, five samples
+/// checked.
 void SignAndCheckATick(benchmark::State& state) {
   const std::string file =
       std::filesystem::temp_directory_path() / fmt::format("ves-bench-{}.key", getpid());

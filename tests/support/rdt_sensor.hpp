@@ -60,17 +60,23 @@ class Sensor {
   int port() const { return port_; }
   int httpPort() const { return http_port_; }
 
-  /// As a live box writes it: the serial number of the calibration is `cfgcalsn`, torque is in `Nm`.
+  /// As a live box writes it: the serial number of the calibration is `cfgcalsn`, torque is in
+  /// `Nm`.
   struct Fields {
     std::string counts_per_force = "1000000", counts_per_torque = "2000000";
     std::string force_unit = "N", torque_unit = "Nm", serial = "FT27462";
   };
   void configure(const Fields& f) {
-    setXml("<?xml version=\"1.0\"?><netft>\n<runstat>0x00000000</runstat><runrate>7000</runrate>\n"
-           "<cfgnam>empty</cfgnam><cfgcalsel>0</cfgcalsel><cfgcalsn>" + f.serial + "</cfgcalsn>\n"
-           "<scfgfu>" + f.force_unit + "</scfgfu><scfgtu>" + f.torque_unit + "</scfgtu>\n<cfgcpf>" +
-           f.counts_per_force + "</cfgcpf><cfgcpt>" + f.counts_per_torque +
-           "</cfgcpt>\n<cfgmr>330;330;990;30;30;30</cfgmr>\n<comrdtrate>7000</comrdtrate>\n</netft>\n");
+    setXml(
+        "<?xml version=\"1.0\"?><netft>\n<runstat>0x00000000</runstat><runrate>7000</runrate>\n"
+        "<cfgnam>empty</cfgnam><cfgcalsel>0</cfgcalsel><cfgcalsn>" +
+        f.serial +
+        "</cfgcalsn>\n"
+        "<scfgfu>" +
+        f.force_unit + "</scfgfu><scfgtu>" + f.torque_unit + "</scfgtu>\n<cfgcpf>" +
+        f.counts_per_force + "</cfgcpf><cfgcpt>" + f.counts_per_torque +
+        "</cfgcpt>\n<cfgmr>330;330;990;30;30;30</cfgmr>\n<comrdtrate>7000</comrdtrate>\n</"
+        "netft>\n");
   }
   void setXml(const std::string& text) {
     const std::lock_guard lock(mutex_);

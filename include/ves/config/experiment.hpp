@@ -39,6 +39,7 @@ struct MachineConfig {
   Source robot = Source::kSimulated;
   Source switches = Source::kSimulated;
   NetFtAddress net_ft;
+  std::int64_t period = 0;  // [ns] between samples, in real time
   double follow = 0.0;  // [1/s] bandwidth at which simulated pieces follow real legs and joints
 
   bool simulated() const {

@@ -22,8 +22,8 @@ class NetFt : public ForceSensor {
   NetFt(const NetFt&) = delete;
   NetFt& operator=(const NetFt&) = delete;
 
-  /// Takes in what has come, each record by the time at which the kernel had it. After half a second of
-  /// silence it asks again.
+  /// Takes in what has come, each record by the time at which the kernel had it. After half a
+  /// second of silence it asks again.
   bool read(WrenchReading& out) noexcept override;
   const RdtStream::Counters& counters() const noexcept { return stream_.counters(); }
 

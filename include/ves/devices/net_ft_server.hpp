@@ -31,14 +31,19 @@ class NetFtServer {
   NetFtServer(const NetFtServer&) = delete;
   NetFtServer& operator=(const NetFtServer&) = delete;
 
-  /// F_So_S [N, N m] from now on, and the status word; a count that 32 bits do not hold reads as the
-  /// largest, and is a fault.
+  /// F_So_S [N, N m] from now on, and the status word; a count that 32 bits do not hold reads as
+  /// the largest, and is a fault.
   void set(const Wrench& F_So_S, std::uint32_t status = 0) noexcept;
 
+  /// Of the records and the page from now on.
+  void calibrate(const NetFtCalibration& calibration) { options_.calibration = calibration; }
+
   /// Answers requests, and sends the client the records that are due at `now` [ns]. What came late
-  /// is sent at once, up to a tenth of a second of it.
+  /// is sent at once, unless it is more than a tenth of a second.
   void serve(std::int64_t now);
-  std::int64_t due() const noexcept { return due_; }  // [ns] of the next record
+  std::int64_t due() const noexcept {  // [ns] of the next record
+    return start_ + moments_ * 1'000'000'000 / options_.rate;
+  }
 
   int port() const noexcept { return port_; }
   int httpPort() const noexcept { return http_port_; }
@@ -59,9 +64,8 @@ class NetFtServer {
   Options options_;
   int records_ = -1, pages_ = -1;  // sockets
   int port_ = 0, http_port_ = 0;
-  std::int64_t period_;   // [ns]
-  std::int64_t due_ = 0;  // [ns]
-  std::optional<Client> client_;  // who asked last: the sensor has one stream
+  std::int64_t start_ = 0, moments_ = 0;              // [ns], [-] since then
+  std::optional<Client> client_;                      // who asked last: the sensor has one stream
   Vec6 counts_ = Vec6::Zero(), bias_ = Vec6::Zero();  // of the sensor
   std::uint32_t status_ = 0, sensor_sequence_ = 0;
   std::int64_t sent_ = 0;

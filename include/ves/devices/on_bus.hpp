@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Pieces whose drivers are programs of their own: each publishes a sample_t with its part filled in,
-// on a channel of its own.
+// Pieces whose drivers are programs of their own: each publishes a sample_t with its part filled
+// in, on a channel of its own.
 #pragma once
 
 #include "ves/devices/devices.hpp"
@@ -28,8 +28,8 @@ class BusPiece {
   std::int64_t arrival_ = 0;  // [ns]
 };
 
-/// A driver of legs hears VES_LEG_COMMAND itself, and keeps the rules of docs/machine.md itself: legs
-/// have to rest whatever becomes of this process.
+/// A driver of legs hears VES_LEG_COMMAND itself, and keeps the rules of docs/machine.md itself:
+/// legs have to rest whatever becomes of this process.
 class LegsOnBus : public Legs {
  public:
   explicit LegsOnBus(Bus& bus);

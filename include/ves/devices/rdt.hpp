@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// ATI's Raw Data Transfer, by which a Net F/T sensor sends its records over UDP (ATI 9620-05-NET FT,
-// section 10), and what its web page says of counts and units. Big endian. The status word's bits
-// differ from box to box; 16 (latch) and 31 (any error) are common.
+// ATI's Raw Data Transfer, by which a Net F/T sensor sends its records over UDP (ATI 9620-05-NET
+// FT, section 10), and what its web page says of counts and units. Big endian. The status word's
+// bits differ from box to box; 16 (latch) and 31 (any error) are common.
 #pragma once
 
 #include <array>
@@ -24,9 +24,9 @@ struct RdtRequest {
 inline constexpr std::size_t kRdtRequestSize = 8;  // [B]
 
 struct RdtRecord {
-  std::uint32_t sequence = 0;         // [-] of records sent
-  std::uint32_t sensor_sequence = 0;  // [-] of the sensor's own samples
-  std::uint32_t status = 0;           // 0: all is well
+  std::uint32_t sequence = 0;                          // [-] of records sent
+  std::uint32_t sensor_sequence = 0;                   // [-] of the sensor's own samples
+  std::uint32_t status = 0;                            // 0: all is well
   std::array<std::int32_t, kWrenchChannels> counts{};  // Fx Fy Fz Tx Ty Tz
 };
 inline constexpr std::size_t kRdtRecordSize = 36;  // [B]

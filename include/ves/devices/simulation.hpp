@@ -36,8 +36,8 @@ class Simulation {
     explicit SimulatedLegs(Simulation& s) : all(s) {}
     void command(const LegCommand& c) noexcept override { all.plant_.command(c); }
     bool read(LegReading& out) noexcept override {
-      out = {all.sample_.legs, all.sample_.adc[kWrenchChannels],
-             all.sample_.legs_time + all.shift_, (all.sample_.faults & kLegsPiece) != 0};
+      out = {all.sample_.legs, all.sample_.adc[kWrenchChannels], all.sample_.legs_time + all.shift_,
+             (all.sample_.faults & kLegsPiece) != 0};
       return true;
     }
     Simulation& all;

@@ -12,9 +12,9 @@
 
 namespace ves::devices {
 
-/// Fading-memory polynomial filter of second degree (N. Morrison, Introduction to Sequential Smoothing
-/// and Prediction, 1969, ch. 13): no lag while the acceleration is constant. Its memory fades with
-/// exp(-bandwidth t).
+/// Fading-memory polynomial filter of second degree (N. Morrison, Introduction to Sequential
+/// Smoothing and Prediction, 1969, ch. 13): no lag while the acceleration is constant. Its memory
+/// fades with exp(-bandwidth t).
 template <int N>
 class Tracker {
  public:

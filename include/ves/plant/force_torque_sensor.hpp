@@ -39,8 +39,8 @@ class ForceTorqueSensor {
   enum class Over { kRamp, kConstant };
   void advance(const Step& step, const Wrench& F_So_S, Over over) noexcept;
 
-  /// F_So_S that the converter's input stands for, `warmer` [C] than when the bias was named: filtered,
-  /// with noise and stray voltage, before it is rounded to counts.
+  /// F_So_S that the converter's input stands for, `warmer` [C] than when the bias was named:
+  /// filtered, with noise and stray voltage, before it is rounded to counts.
   Wrench reading(double warmer) const noexcept;
 
   /// Sixteen bits, saturating, of all seven channels, `warmer` [C] than when the bias was named.
@@ -52,7 +52,7 @@ class ForceTorqueSensor {
   ForceTorqueSensorModel model_;
   Mat6 volts_per_newton_;  // [V/N | V/(N m)] bridge and amplifier
   Mat6 newtons_per_volt_;
-  Channels noise_gain_;    // [V/sqrt(Hz)] after the amplifier
+  Channels noise_gain_;  // [V/sqrt(Hz)] after the amplifier
   bool noisy_;
   Butterworth2<kWrenchChannels> filter_;
   Noise noise_;

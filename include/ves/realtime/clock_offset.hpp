@@ -8,9 +8,9 @@
 namespace ves {
 
 /// A message and its answer bound the other clock's offset: ours t1 when it left, theirs t2 when it
-/// came and t3 when the answer left, ours t4 when that came. The offset is ((t2 - t1) + (t3 - t4))/2,
-/// off by at most half of the round trip, (t4 - t1) - (t3 - t2) (RFC 5905, section 8). The shortest
-/// round trip is kept; what it says grows less certain as two clocks drift apart.
+/// came and t3 when the answer left, ours t4 when that came. The offset is ((t2 - t1) + (t3 -
+/// t4))/2, off by at most half of the round trip, (t4 - t1) - (t3 - t2) (RFC 5905, section 8). The
+/// shortest round trip is kept; what it says grows less certain as two clocks drift apart.
 class ClockOffset {
  public:
   static constexpr double kDrift = 1e-4;  // [-] of two quartz clocks against each other, at most

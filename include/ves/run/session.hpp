@@ -61,8 +61,8 @@ class Session {
   std::unique_ptr<Process> plant_, controller_;
   bool interrupted_ = false;
   std::optional<state_t> state_;
-  std::int64_t heard_ = 0;   // [-] states
-  std::int64_t orders_ = 0;  // [-] given
+  std::int64_t heard_ = 0;    // [-] states
+  std::int64_t orders_ = 0;   // [-] given
   std::int64_t machine_ = 0;  // header.source of its samples; 0: none yet
   RunResult result_;
   OnState on_state_;

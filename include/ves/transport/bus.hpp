@@ -124,9 +124,9 @@ struct Rejections {
 /// The controller's side: the newest sample, the operator's orders, whether somebody else is there.
 ///
 /// On a bus with a key a machine is taken only when its sample names a command of this controller:
-/// so it is alive, and no recording. A machine that was started anew takes the place of the old one while nothing is engaged. From
-/// then on the machine is the machine: samples of another are not let in and count as a
-/// conflict.
+/// so it is alive, and no recording. A machine that was started anew takes the place of the old one
+/// while nothing is engaged. From then on the machine is the machine: samples of another are not
+/// let in and count as a conflict.
 class ControllerLink {
  public:
   ControllerLink(Bus& bus, const Identity& self);

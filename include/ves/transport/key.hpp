@@ -10,8 +10,9 @@
 
 namespace ves {
 
-/// Signs messages with BLAKE2b (RFC 7693), keyed, 128 bits: over the channel's name, its NUL, and the
-/// message with its header's signature zero. Every message begins with fingerprint and header_t.
+/// Signs messages with BLAKE2b (RFC 7693), keyed, 128 bits: over the channel's name, its NUL, and
+/// the message with its header's signature zero. Every message begins with fingerprint and
+/// header_t.
 class Key {
  public:
   /// Of a file with 64 hexadecimal digits that nobody but its owner can read. Throws InputError.
