@@ -33,16 +33,34 @@ std::vector<Requirement> listen(const Experiment& experiment, const std::string&
   return judge->verdict(monotonicNow());
 }
 
-/// Arms, 20 mm up and home again, parks.
-Requirement move(const Experiment& experiment, const ProcessOptions& process) {
-  const RunResult result = runController(experiment, process, [](const TickState&) {
+/// Arms, 20 mm up and tilted so that every leg goes a way of its own, home again, parks.
+std::vector<Requirement> move(const Experiment& experiment, const ProcessOptions& process) {
+  Mat6 apart = Mat6::Zero();  // [m^2] row: a leg as measured; column: a leg as told
+  const RunResult result = runController(experiment, process, [&](const TickState& s) {
+    if (s.command.engaged)
+      apart += (s.L_measured.replicate<1, 6>() - s.legs.L.transpose().replicate<6, 1>())
+                   .array()
+                   .square()
+                   .matrix();
     return stop_requested ? Order{Request::kStop, {}, {}} : Order();
   });
-  Requirement out{"a gentle move", "arms, 20 mm up and back, parks", "",
-                  result.phase == Phase::kParked && !result.aborted};
-  out.found = out.kept ? fmt::format("parked after {:.1f} s", result.simulated) : whyNot(result);
-  if (out.found.empty()) out.found = "ended early";
-  return out;
+  Requirement moved{"a gentle move", "arms, 20 mm up and back, parks", "",
+                    result.phase == Phase::kParked && !result.aborted};
+  moved.found =
+      moved.kept ? fmt::format("parked after {:.1f} s", result.simulated) : whyNot(result);
+  if (moved.found.empty()) moved.found = "ended early";
+  // A leg lags behind what it was told, and is farther from what another was.
+  std::string crossed;
+  for (int i = 0; i < kLegs; ++i) {
+    Eigen::Index nearest = 0;
+    apart.row(i).minCoeff(&nearest);
+    if (nearest != i)
+      crossed += fmt::format("{}leg {} goes as leg {} is told", crossed.empty() ? "" : ", ", i + 1,
+                             nearest + 1);
+  }
+  return {moved,
+          {"which leg", "each goes the way it is told", crossed.empty() ? "all do" : crossed,
+           crossed.empty()}};
 }
 
 }  // namespace
@@ -51,7 +69,8 @@ int conformCommand(int argc, char** argv) {
   CLI::App cli(
       "Listens to the machine on the bus as a controller that commands nothing, and says which "
       "requirements of docs/machine.md it keeps. With --move it then arms and moves the platform "
-      "20 mm up and back. Status 1 when one is not kept. The scenario says which machine is "
+      "20 mm up, tilted, and back. Status 1 when one is not kept. The scenario says which machine "
+      "is "
       "expected.",
       "ves conform");
   Options options;
@@ -66,7 +85,8 @@ int conformCommand(int argc, char** argv) {
   cli.add_flag("--move", moves, "move the platform, when all else is well");
   return run(cli, argc, argv, [&] {
     options.overrides.push_back(
-        "program=[{move: {}}, {move: {to: {z_m: 0.02}, duration_s: 2}}, {move: {}}]");
+        "program=[{move: {}}, {move: {to: {x_m: 0.01, y_m: -0.008, z_m: 0.02, alpha_deg: 2, "
+        "beta_deg: -1.5, gamma_deg: 1}, duration_s: 2}}, {move: {}}]");
     const Experiment experiment = options.load();
     options.enterBus();
     catchSignals();
@@ -76,7 +96,7 @@ int conformCommand(int argc, char** argv) {
     const bool well = std::all_of(all.begin(), all.end(), kept);
     if (moves && well) {
       options.process.start = true;
-      all.push_back(move(experiment, options.process));
+      for (const Requirement& r : move(experiment, options.process)) all.push_back(r);
     }
     for (const Requirement& r : all)
       fmt::print("{} {:<16} {:<42} {}\n", r.kept ? "ok" : "NO", r.name, r.asked, r.found);

@@ -14,20 +14,15 @@ int onBusCommand(int argc, char** argv) {
       "reaches too: somebody's machine is tried there without touching the network.",
       "ves on-bus");
   std::string name;
-  std::vector<std::string> program;
+  std::string program;
   cli.add_option("name", name, "of the bus; the first to ask begins it")->required();
   cli.add_option("program", program, "and its arguments")->required();
-  cli.prefix_command();
-  return run(cli, argc, argv, [&] {
-    for (const std::string& more : cli.remaining()) program.push_back(more);
-    if (program.front() == "--") program.erase(program.begin());
-    if (program.empty()) throw InputError("program: want one to run");
+  // What stands behind the program is not ours to read.
+  const int ours = std::min(argc, 3);
+  return run(cli, ours, argv, [&] {
     joinPrivateBus(name);
-    std::vector<char*> arguments;
-    for (std::string& argument : program) arguments.push_back(argument.data());
-    arguments.push_back(nullptr);
-    execvp(arguments.front(), arguments.data());
-    throw InputError(fmt::format("{}: {}", program.front(), std::strerror(errno)));
+    execvp(argv[2], argv + 2);
+    throw InputError(fmt::format("{}: {}", program, std::strerror(errno)));
     return kDone;
   });
 }

@@ -137,5 +137,64 @@ TEST_F(ConformProgram, OurOwnPlantKeepsAllAndMoves) {
   EXPECT_NE(all.text.find("parked after"), std::string::npos) << all.text;
 }
 
+/// Somebody's machine in Python: our template, and one that does one thing wrong.
+class PythonMachine : public ConformProgram {
+ protected:
+  static Process python(const std::string& script, std::vector<std::string> arguments,
+                        const std::string& loss = "0") {
+    const std::string source = VES_TEST_SOURCE_DIR;
+    setenv("PYTHONPATH",
+           (source + "/tests/support/python:" + VES_TEST_APP_DIR + "/../python").c_str(), 1);
+    setenv("PYTHONDONTWRITEBYTECODE", "1", 1);
+    setenv("VES_TEST_LOSS", loss.c_str(), 1);
+    arguments.insert(arguments.begin(), source + "/" + script);
+    return {"/usr/bin/python3", arguments};
+  }
+};
+
+TEST_F(PythonMachine, TheTemplateKeepsAllAndMoves) {
+  enterPrivateBus();
+  Process machine = python("apps/examples/machine.py", {"--rate", "110"});
+  const test::Output all = test::sh(app("conform") + "z_sine --move " + patient());
+  EXPECT_EQ(all.status, 0) << all.text;
+}
+
+TEST_F(PythonMachine, TheTemplateKeepsAllAndMovesWhileThirtyPercentIsLost) {
+  enterPrivateBus();
+  Process machine = python("apps/examples/machine.py", {"--rate", "500"}, "0.3");
+  const test::Output all = test::sh(app("conform") + "z_sine --move " + patient());
+  EXPECT_EQ(all.status, 0) << all.text;
+}
+
+struct Wrong {
+  const char* what;
+  const char* named;  // requirement
+};
+class WrongMachine : public PythonMachine, public testing::WithParamInterface<Wrong> {};
+
+TEST_P(WrongMachine, IsNamed) {
+  enterPrivateBus();
+  Process machine = python("tests/support/python/broken_machine.py", {GetParam().what});
+  const test::Output all = test::sh(app("conform") + "z_sine --move " + patient());
+  EXPECT_EQ(all.status, 1) << all.text;
+  std::istringstream lines(all.text);
+  std::string line, not_kept;
+  while (std::getline(lines, line))
+    if (line.rfind("NO ", 0) == 0) not_kept += line + "\n";
+  EXPECT_EQ(not_kept.rfind(std::string("NO ") + GetParam().named, 0), 0u) << all.text;
+}
+
+INSTANTIATE_TEST_SUITE_P(One, WrongMachine,
+                         testing::Values(Wrong{"restart", "source"},
+                                         Wrong{"stalled clock", "clock"}, Wrong{"NaN", "ranges"},
+                                         Wrong{"epoch 0", "epoch"},
+                                         Wrong{"ADC out of range", "ranges"},
+                                         Wrong{"swapped legs", "which leg"}),
+                         [](const auto& tried) {
+                           std::string name = tried.param.what;
+                           std::replace(name.begin(), name.end(), ' ', '_');
+                           return name;
+                         });
+
 }  // namespace
 }  // namespace ves

@@ -396,6 +396,11 @@ TEST(Pieces, OneThatIsTooOldOrAtFaultStopsTheRunByName) {
   for (const std::uint32_t piece : {kLegsPiece, kSensorPiece, kRobotPiece})
     EXPECT_EQ(stoppedBy([&](Sample& s) { s.faults = piece; }), Check::kDevice);
   EXPECT_EQ(stoppedBy([&](Sample& s) { s.faults = 8; }), Check::kStale);  // nobody's bit
+  // A clock that stands still while samples come: none of them is new.
+  EXPECT_EQ(stoppedBy([&](Sample& s) {
+              s.time = s.legs_time = s.wrench_time = s.joints_time = 2'000'000'000;
+            }),
+            Check::kStale);
 }
 
 // --- A machine with drivers on the bus -----------------------------------------------------------
@@ -541,6 +546,73 @@ TEST(RealLegs, CarryThePlatformOfTheSimulatedRobot) {
   EXPECT_LT(position, 2.0 * e.controller.legs.scale(0));
   // A count is 70 um: its second derivative is rough, and its smoothing late.
   EXPECT_LT(std::sqrt(square), 0.25 * kAmplitude * kOmega * kOmega);
+}
+
+// --- Whole runs with a real piece
+// ------------------------------------------------------------------
+
+class ComposedRun : public test::Programs {
+ protected:
+  /// Ends parked, with these pieces.
+  void parks(std::vector<std::string> sets) {
+    std::vector<std::string> arguments = {"z_sine",
+                                          "--no-plots",
+                                          "--quiet",
+                                          "--set",
+                                          kShortProgram,
+                                          "--out",
+                                          (folder_ / "run").string()};
+    arguments.insert(arguments.end(), patience().begin(), patience().end());
+    for (const std::string& set : sets) arguments.insert(arguments.end(), {"--set", set});
+    Process run = start("run", arguments);
+    EXPECT_EQ(run.wait(), 0);
+    EXPECT_EQ(summary(folder_ / "run")["ended"], "parked");
+  }
+};
+
+TEST_F(ComposedRun, ParksOnLegsOfTheCppTemplate) {
+  enterPrivateBus();
+  Process legs(std::string(VES_TEST_APP_DIR) + "/examples/legs_driver",
+               {std::string(VES_TEST_CONFIG_DIR) + "/scenarios/z_sine.yaml"});
+  parks({"machine.legs=external"});
+  // The controller measures what these legs did; nobody knows a truth.
+  EXPECT_GT(summary(folder_ / "run")["ticks"].get<int>(), 300);
+  legs.signal(SIGTERM);
+  EXPECT_EQ(legs.wait(), 0);
+}
+
+TEST_F(ComposedRun, ParksWithItsForceSensorOverTheNetwork) {
+  enterPrivateBus();
+  Process sensor = start("netft-server", {"z_sine", "--port", "50001", "--http-port", "50002"});
+  const NetFtAddress address{"127.0.0.1", 50001, 50002};
+  for (int i = 0; i < 100; ++i) {
+    if (test::refusal([&] { fetchNetFtXml(address, 1000); }).empty()) break;
+    usleep(50'000);
+  }
+  parks({"machine.force_sensor=net_ft", "machine.net_ft.host=127.0.0.1",
+         "machine.net_ft.port=50001", "machine.net_ft.http_port=50002"});
+  const auto s = summary(folder_ / "run");
+  EXPECT_LT(s["wrench_age_median_s"].get<double>(), 0.02);
+  EXPECT_TRUE(s.contains("clock_uncertainty_s"));  // the machine named our commands
+  sensor.signal(SIGTERM);
+  EXPECT_EQ(sensor.wait(), 0);
+}
+
+TEST_F(ComposedRun, AMissingPieceIsNamedAndLockstepRefuses) {
+  enterPrivateBus();
+  const test::Output lockstep =
+      run("z_sine --lockstep --no-plots --set machine.legs=external" + out("a"));
+  EXPECT_EQ(lockstep.status, 2);
+  EXPECT_NE(lockstep.text.find("runs in real time"), std::string::npos) << lockstep.text;
+  const test::Output nobody = run(
+      "z_sine --no-plots --set machine.force_sensor=net_ft --set machine.net_ft.host=127.0.0.1" +
+      out("b"));
+  EXPECT_EQ(nobody.status, 2);
+  EXPECT_NE(nobody.text.find("force sensor 127.0.0.1:80"), std::string::npos) << nobody.text;
+  const test::Output silent = run("z_sine --no-plots --set machine.robot=external" + out("c"));
+  EXPECT_EQ(silent.status, 2);
+  EXPECT_NE(silent.text.find("waiting for the robot's joints (VES_JOINTS)"), std::string::npos)
+      << silent.text;
 }
 
 }  // namespace

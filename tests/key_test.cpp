@@ -162,7 +162,7 @@ TEST_F(KeyedBus, OnlyAMachineThatAnswersIsTaken) {
 
 TEST_F(KeyedBus, CommandsAndOrdersThatAreForgedAlteredOrReplayedAreIgnored) {
   Bus machine(url()), controller(url()), stranger(kDefaultUrl);
-  PlantLink link(machine, {3, 3});
+  PlantLink link(machine, Identity{3, 3});
   lcm::LCM raw(kDefaultUrl);
   std::vector<std::pair<std::string, Bytes>> heard;
   stranger.subscribe("VES_.*", [&](const std::string& channel, const void* data, std::uint32_t n) {

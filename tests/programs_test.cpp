@@ -166,6 +166,38 @@ TEST_F(Programs, AnMcapFileIsWrittenDuringARun) {
   EXPECT_NE(bytes.find("configuration_hash"), std::string::npos);
 }
 
+TEST_F(Programs, ThoseWhoNameAPrivateBusAreOnOneNetworkAndNobodyElse) {
+  setenv("XDG_RUNTIME_DIR", folder_.c_str(), 1);
+  const std::string network = "readlink /proc/self/ns/net";
+  const auto on = [&](const std::string& name, const std::string& command) {
+    const Output o = sh(app("on-bus") + name + " " + command);
+    EXPECT_EQ(o.status, 0) << o.text;
+    return o.text;
+  };
+  const std::string outside = sh(network).text;
+  // While the first is there: its network, for all of that name.
+  Process first(
+      std::string(VES_TEST_APP_DIR) + "/ves",
+      {"on-bus", "a", "sh", "-c",
+       network + " > " + (folder_ / "first").string() + ".new; mv " + (folder_ / "first").string() +
+           ".new " + (folder_ / "first").string() + "; sleep 60"});
+  while (!fs::exists(folder_ / "first") && first.running()) usleep(10'000);
+  std::string there;
+  std::getline(std::ifstream(folder_ / "first"), there);
+  EXPECT_NE(there + "\n", outside);
+  EXPECT_EQ(on("a", network), there + "\n");
+  EXPECT_EQ(on("a", network), there + "\n");
+  EXPECT_NE(on("b", network), there + "\n");
+  first.signal(SIGKILL);
+  first.wait();
+  EXPECT_NE(on("a", network), there + "\n");  // gone with the last; its number may be another's now
+  EXPECT_EQ(sh(app("on-bus") + "../a true").status, 2);
+  fs::permissions(folder_ / "ves", fs::perms::all);
+  const Output open = sh(app("on-bus") + "a true");
+  EXPECT_EQ(open.status, 2);
+  EXPECT_NE(open.text.find("only this user"), std::string::npos) << open.text;
+}
+
 TEST_F(Programs, SecondControllerRefusesToArmAndTheFirstGoesOn) {
   enterPrivateBus();
   Bus bus(kDefaultUrl);

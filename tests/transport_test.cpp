@@ -262,7 +262,7 @@ TEST_F(PrivateBus, WhoComesLateHearsTheConfiguration) {
 
 TEST_F(PrivateBus, OneControllerHasTheLegs) {
   Bus machine(kDefaultUrl), bus(kDefaultUrl);
-  PlantLink link(machine, {1, 1});
+  PlantLink link(machine, Identity{1, 1});
   ControllerLink first(bus, {1, 1}), second(bus, {2, 1});
   std::int64_t now = 0;
   const auto send = [&](std::int64_t source, std::int64_t sequence, bool engaged) {
@@ -298,7 +298,7 @@ TEST_F(PrivateBus, OneControllerHasTheLegs) {
 
 TEST_F(PrivateBus, RandomBytesOnEveryChannelAreNobodys) {
   Bus machine(kDefaultUrl), bus(kDefaultUrl);
-  PlantLink plant(machine, {1, 1});
+  PlantLink plant(machine, Identity{1, 1});
   ControllerLink controller(bus, {1, 1});
   lcm::LCM raw(kDefaultUrl);
   std::mt19937 random(3);

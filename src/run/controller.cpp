@@ -17,6 +17,7 @@ constexpr int kControllerPriority = 80;  // [-] SCHED_FIFO
 constexpr int kAnswerTime = 200;         // [ms] lockstep, before a message is repeated
 constexpr int kAnswerTries = 50;         // [-] before the other side counts as gone
 constexpr std::int64_t kFirstSampleTime = 10'000'000'000;  // [ns]
+constexpr std::int64_t kHello = 100'000'000;               // [ns] between two of them
 constexpr std::int64_t kWorthAWord = 2'000'000'000;        // [ns]
 
 /// Counts the times of this tick into the histograms.
@@ -132,6 +133,7 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
   }
 
   enableRealtime("controller", kControllerPriority, options.realtime);
+  std::int64_t hello = 0;  // [ns] the last
   for (bool told = false; link.sample().sequence < 0;) {
     if (wantsOut()) return letGo();
     if (!told && monotonicNow() - start > kWorthAWord) {
@@ -143,7 +145,10 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
       throw InputError(fmt::format("bus {}: no machine to be heard{}", options.url,
                                    why.empty() ? "" : "; " + why));
     // Who is here: on a bus with a key a machine is believed when it answers.
-    link.send(toMessage(LegCommand(), header(self, -1, monotonicNow())));
+    if (monotonicNow() - hello > kHello) {
+      hello = monotonicNow();
+      link.send(toMessage(LegCommand(), header(self, -1, hello)));
+    }
     bus.wait(100);
   }
   Ticker ticker(experiment.controller.period);

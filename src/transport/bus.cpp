@@ -259,7 +259,7 @@ void ControllerLink::send(leg_command_t command) noexcept {
   bus_.publish(channel::kLegCommand, command);
 }
 
-PlantLink::PlantLink(Bus& bus, const Identity& self) : bus_(bus), self_(self) {
+PlantLink::PlantLink(Bus& bus, const std::optional<Identity>& self) : bus_(bus), self_(self) {
   bus.subscribe(
       channel::kLegCommand, [this](const std::string&, const void* data, std::uint32_t size) {
         const auto message = decode<leg_command_t>(data, size);
@@ -283,7 +283,7 @@ PlantLink::PlantLink(Bus& bus, const Identity& self) : bus_(bus), self_(self) {
 
 /// A command for this machine. Without a key one that names none is for everybody.
 bool PlantLink::means(std::int64_t machine) const noexcept {
-  return machine == self_.source || (machine == 0 && !bus_.keyed());
+  return !self_ || machine == self_->source || (machine == 0 && !bus_.keyed());
 }
 
 bool PlantLink::mayCommand(const header_t& from, std::int64_t machine, bool engaged) noexcept {

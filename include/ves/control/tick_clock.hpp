@@ -44,12 +44,13 @@ class TickClock {
 class SampleStream {
  public:
   /// An older sample than the last is none, while the legs are ours; before that, a machine may
-  /// begin anew.
+  /// begin anew. One whose clock stands still is not new either.
   void update(const Sample& newest, bool engaged, bool conflict) noexcept {
-    const std::int64_t last = sample_.sequence;
+    const std::int64_t last = sample_.sequence, last_time = sample_.time;
     if (!(engaged && newest.sequence < last)) sample_ = newest;
     age_before_ = age_;
-    age_ = sample_.sequence > last ? 0 : age_ + 1;
+    const bool newer = sample_.sequence > last && (sample_.time > last_time || last < 0);
+    age_ = newer ? 0 : age_ + 1;
     fresh_ticks_ = fresh() && !conflict ? fresh_ticks_ + 1 : 0;
   }
   /// The count of fresh ticks begins anew.

@@ -182,9 +182,10 @@ class PlantLink {
   /// A controller keeps the legs until it lets go or is silent for so long.
   static constexpr std::int64_t kSilence = 500'000'000;  // [ns]
 
-  /// On a bus with a key, commands and orders of the robot have to name `self`: those of an earlier
-  /// machine are replayed ones.
-  PlantLink(Bus& bus, const Identity& self);
+  /// Commands and orders that name another machine than `self` are not for this one; on a bus with a
+  /// key they have to name it: those of an earlier machine are recordings. The driver of one piece,
+  /// which is not the machine that they name, has no `self`.
+  PlantLink(Bus& bus, const std::optional<Identity>& self);
 
   /// The plant's clock, by which silence counts.
   void setTime(std::int64_t now) noexcept { now_ = now; }
@@ -208,7 +209,7 @@ class PlantLink {
   bool means(std::int64_t machine) const noexcept;
 
   Bus& bus_;
-  Identity self_;
+  std::optional<Identity> self_;
   Heard last_heard_;
   std::int64_t now_ = 0;  // [ns]
   Identity master_;       // who has the legs
