@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 #include <sys/socket.h>
 
+#include <Eigen/QR>
 #include <random>
 
 #include "support/programs.hpp"
@@ -83,10 +84,39 @@ TEST(Tracker, HasNoLagWhileTheAccelerationIsConstant) {
   EXPECT_NEAR(m.x(0), x(s), 1e-9);
   EXPECT_NEAR(m.v(0), -0.2 + 0.7 * s, 1e-8);
   EXPECT_NEAR(m.a(0), 0.7, 1e-6);
+  // An older reading is none.
+  tracker.take(Eigen::Matrix<double, 1, 1>(7.0), t - 500'000'000);
+  EXPECT_EQ(tracker.at(t).x(0), m.x(0));
   // What is silent is at rest where it was going, not on its way to infinity.
   const auto later = tracker.at(t + 60'000'000'000);
   EXPECT_EQ(later.v(0), 0.0);
   EXPECT_NEAR(later.x(0), x(s), 0.1);
+}
+
+TEST(Tracker, IsTheParabolaOfLeastSquaresOverAFadingMemory) {
+  constexpr double kBandwidth = 40.0, kPeriod = 0.004;  // [1/s], [s]
+  const double theta = std::exp(-kBandwidth * kPeriod);
+  Tracker<1> tracker(kBandwidth);
+  std::mt19937 random(5);
+  std::normal_distribution<double> noise;
+  std::vector<double> x;
+  for (int i = 0; i < 400; ++i) {
+    x.push_back(0.1 * std::sin(0.05 * i) + 0.01 * noise(random));
+    tracker.take(Eigen::Matrix<double, 1, 1>(x.back()), i * 4'000'000LL);
+  }
+  // Weights theta^age; the 400th is worth 1e-28.
+  Eigen::MatrixXd A(400, 3);
+  Eigen::VectorXd b(400);
+  for (int age = 0; age < 400; ++age) {
+    const double w = std::sqrt(std::pow(theta, age)), t = -age * kPeriod;
+    A.row(age) << w, w * t, w * t * t / 2.0;
+    b(age) = w * x[static_cast<std::size_t>(399 - age)];
+  }
+  const Eigen::Vector3d fit = A.colPivHouseholderQr().solve(b);
+  const auto m = tracker.at(399 * 4'000'000LL);
+  EXPECT_NEAR(m.x(0), fit(0), 1e-10);
+  EXPECT_NEAR(m.v(0), fit(1), 1e-9);
+  EXPECT_NEAR(m.a(0), fit(2), 1e-7);
 }
 
 // --- RDT ---------------------------------------------------------------------------------------
@@ -203,6 +233,7 @@ TEST(Rdt, CalibrationIsReadInTheSensorsUnitsOrRefusedByItsTag) {
   for (const auto& [text, tag] : {std::pair{with("1000000", "0"), "cfgcpf"},
                                   {with("1000000", "-1"), "cfgcpf"},
                                   {with("1000000", "nan"), "cfgcpf"},
+                                  {with("1000000", "inf"), "cfgcpf"},
                                   {with("1000000", "1e6x"), "cfgcpf"},
                                   {with("2000000", ""), "cfgcpt"},
                                   {with(">N<", ">stone<"), "scfgfu"},
@@ -261,10 +292,15 @@ TEST(NetFt, ReadsRecordsWithTheirTimeAsksAgainAndNeverTakesABias) {
     EXPECT_FALSE(w.fault);
     // Another tool was mounted, and its calibration chosen.
     sensor.setHttpStatus(503);  // busy: no fault
+    const int pages = sensor.pages();
+    while (sensor.pages() == pages) usleep(1000);
+    sensor.send({4, 4, 0, {}});
+    ASSERT_TRUE(until(driver, w, [&] { return w.counts[0] == 0; }));
+    EXPECT_FALSE(w.fault);
     sensor.configure({.serial = "FT99999"});
     sensor.setHttpStatus(200);
     ASSERT_TRUE(until(driver, w, [&] {
-      sensor.send({4, 4, 0, {}});
+      sensor.send({5, 5, 0, {}});
       return w.fault;
     }));
   }
@@ -592,6 +628,7 @@ TEST_F(ComposedRun, ParksWithItsForceSensorOverTheNetwork) {
   parks({"machine.force_sensor=net_ft", "machine.net_ft.host=127.0.0.1",
          "machine.net_ft.port=50001", "machine.net_ft.http_port=50002"});
   const auto s = summary(folder_ / "run");
+  EXPECT_NEAR(s["z_peak_to_peak_m"].get<double>(), 0.04, 2e-3);  // simulated legs go as they did
   EXPECT_LT(s["wrench_age_median_s"].get<double>(), 0.02);
   EXPECT_TRUE(s.contains("clock_uncertainty_s"));  // the machine named our commands
   sensor.signal(SIGTERM);

@@ -210,7 +210,15 @@ TEST_F(KeyedBus, CommandsAndOrdersThatAreForgedAlteredOrReplayedAreIgnored) {
   EXPECT_TRUE(link.takeRobotOrders().empty());
   EXPECT_GT(machine.refused().forged, 240);
   EXPECT_GT(machine.refused().replayed, 150);
-  controller.publish(channel::kLegCommand, command(6, 3));  // the true one's next is taken
+  // Recordings of what the same controller told another machine.
+  controller.publish(channel::kLegCommand, command(6, 4));
+  order = toMessage(RobotMove{1, 0.3, 1.0}, header({9, 9}, 2, 0));
+  order.machine = 4;
+  controller.publish(channel::kRobot, order);
+  settle({&machine});
+  EXPECT_FALSE(link.takeCommand());
+  EXPECT_TRUE(link.takeRobotOrders().empty());
+  controller.publish(channel::kLegCommand, command(7, 3));  // the true one's next is taken
   settle({&machine});
   ASSERT_TRUE(link.takeCommand());
 }

@@ -191,6 +191,9 @@ TEST_F(Programs, ThoseWhoNameAPrivateBusAreOnOneNetworkAndNobodyElse) {
   first.signal(SIGKILL);
   first.wait();
   EXPECT_NE(on("a", network), there + "\n");  // gone with the last; its number may be another's now
+  // Whose number somebody in another network has now is not here.
+  std::ofstream(folder_ / "ves" / "c") << getpid() << " 1\n";
+  EXPECT_NE(on("c", network), outside);
   EXPECT_EQ(sh(app("on-bus") + "../a true").status, 2);
   fs::permissions(folder_ / "ves", fs::perms::all);
   const Output open = sh(app("on-bus") + "a true");

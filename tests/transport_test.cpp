@@ -7,6 +7,7 @@
 
 #include "support/refusal.hpp"
 #include "ves/config/document.hpp"
+#include "ves/realtime/realtime.hpp"
 #include "ves/run/announcer.hpp"
 #include "ves/transport/bus.hpp"
 #include "ves/transport/channels.hpp"
@@ -211,6 +212,36 @@ TEST_F(PrivateBus, ControllerKeepsTheNewestSampleOfTheNewestPlant) {
   settle(machine, controller, [&] { return link.rejected() == 4; });
   EXPECT_EQ(link.sample().sequence, 0);
   EXPECT_TRUE(link.takeConflict());
+}
+
+TEST_F(PrivateBus, AMachinesClockIsKnownFromWhatGoesToAndFro) {
+  Bus machine(kDefaultUrl), controller(kDefaultUrl);
+  const Identity self{9, 9};
+  ControllerLink link(controller, self);
+  PlantLink plant(machine, std::nullopt);
+  std::int64_t tick = 0;
+  // Hosts whose clocks are an hour ahead, then a machine on another one, two hours behind.
+  for (const auto& [epoch, ahead] :
+       {std::pair{100LL, 3'600'000'000'000LL}, {200LL, -7'200'000'000'000LL}}) {
+    const std::int64_t theirs = ahead + 100'000'000'000'000;
+    for (std::int64_t i = 0; i < 20; ++i, ++tick) {
+      link.send(toMessage(LegCommand{}, header(self, tick, monotonicNow())));
+      settle(machine, controller, [&] { return plant.lastHeard().sequence == tick; });
+      Sample s = goodSample();
+      s.sequence = i;
+      s.time = monotonicNow() + theirs;
+      s.legs_time = s.wrench_time = s.joints_time = s.time;
+      sample_t m = toMessage(s, {1, epoch}, -1);
+      m.command_source = plant.lastHeard().source;
+      m.command_sequence = plant.lastHeard().sequence;
+      m.command_time_ns = plant.lastHeard().time + theirs;
+      machine.publish(channel::kSample, m);
+      settle(machine, controller, [&] { return link.sampleTime() == s.time; });
+    }
+    const std::int64_t now = monotonicNow();
+    EXPECT_LE(std::abs(link.clock().offset(now) - theirs), link.clock().uncertainty(now));
+    EXPECT_LT(link.clock().uncertainty(now), 50'000'000);
+  }
 }
 
 TEST_F(PrivateBus, WhoComesLateHearsTheConfiguration) {

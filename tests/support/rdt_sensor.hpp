@@ -96,6 +96,11 @@ class Sensor {
     const std::lock_guard lock(mutex_);
     return client_.has_value();
   }
+  /// Asked for so far.
+  int pages() {
+    const std::lock_guard lock(mutex_);
+    return pages_;
+  }
   void forgetClient() {
     const std::lock_guard lock(mutex_);
     client_.reset();
@@ -142,6 +147,7 @@ class Sensor {
       for (ssize_t got; request.find("\r\n\r\n") == std::string::npos &&
                         (got = recv(fd, buffer, sizeof buffer, 0)) > 0;)
         request.append(buffer, static_cast<std::size_t>(got));
+      ++pages_;
       const bool found = request.rfind("GET /netftapi2.xml ", 0) == 0;
       const std::string answer = "HTTP/1.0 " + std::to_string(found ? http_status_ : 404) +
                                  " X\r\nContent-Type: text/xml\r\n\r\n" + (found ? xml_ : "");
@@ -153,7 +159,7 @@ class Sensor {
   int udp_, http_;
   std::mutex mutex_;
   std::string xml_;
-  int http_status_ = 200;
+  int http_status_ = 200, pages_ = 0;
   std::vector<int> commands_;
   std::optional<sockaddr_in> client_;
   std::jthread thread_;
