@@ -12,8 +12,9 @@ namespace ves::app {
 namespace {
 
 constexpr std::int64_t kFirstSample = 10'000'000'000;  // [ns]
+constexpr std::int64_t kHello = 100'000'000;           // [ns] between commands that engage nothing
 
-/// Commands nothing.
+/// Engages nothing; says that it is there.
 std::vector<Requirement> listen(const Experiment& experiment, const std::string& url,
                                 double seconds) {
   const Identity self = Identity::draw();
@@ -29,7 +30,12 @@ std::vector<Requirement> listen(const Experiment& experiment, const std::string&
   while (!judge && !stop_requested && monotonicNow() - start < kFirstSample) bus.wait(100);
   if (!judge) return {{"samples", "heard", "none in 10 s", false}};
   const std::int64_t end = monotonicNow() + static_cast<std::int64_t>(seconds * 1e9);
-  while (!stop_requested && monotonicNow() < end) bus.wait(20);
+  const leg_command_t hello = toMessage(LegCommand(), header(self, -1, 0));
+  for (std::int64_t said = 0; !stop_requested && monotonicNow() < end; bus.wait(20)) {
+    if (monotonicNow() - said < kHello) continue;
+    said = monotonicNow();
+    bus.publish(channel::kLegCommand, hello);
+  }
   return judge->verdict(monotonicNow());
 }
 

@@ -38,6 +38,8 @@ Names broken(const std::function<bool(int, sample_t&)>& spoil, double rate = 500
     for (int k = 0; k < 6; ++k) m.legs[k] = s.leg_home[k] + i % 2;
     m.switches = static_cast<int>(kAllSwitchesClosed);
     m.temperature = 20.0;
+    m.legs_time_ns = m.wrench_time_ns = m.joints_time_ns = m.header.time_ns - 1'000'000;
+    m.command_source = s.header.source;
     if (!spoil(i, m)) continue;
     std::vector<std::uint8_t> bytes(static_cast<std::size_t>(m.getEncodedSize()));
     m.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
@@ -76,17 +78,37 @@ TEST(Conform, WhatIsNotKeptIsNamedAndNothingElse) {
             Names({"epoch"}));
   EXPECT_EQ(broken([](int i, sample_t& m) {
               if (i > 400) m.header.time_ns = 1;
+              m.legs_time_ns = m.wrench_time_ns = m.joints_time_ns = 0;
               return true;
             }),
             Names({"clock"}));
   EXPECT_EQ(broken([](int i, sample_t& m) {
               m.header.time_ns += i * 100'000;  // 5 % fast
+              m.legs_time_ns = m.wrench_time_ns = m.joints_time_ns = 0;
               return true;
             }),
             Names({"clock"}));
   EXPECT_EQ(broken(at(500, [](sample_t& m) { m.adc[2] = 40000; })), Names({"ranges"}));
   EXPECT_EQ(broken(at(500, [](sample_t& m) { m.q[1] = NAN; })), Names({"ranges", "joints"}));
   EXPECT_EQ(broken(at(500, [](sample_t& m) { m.temperature = NAN; })), Names({"ranges"}));
+  const std::int64_t longest = setup().stale_ticks * setup().period_ns;
+  for (std::int64_t sample_t::*stamp :
+       {&sample_t::legs_time_ns, &sample_t::wrench_time_ns, &sample_t::joints_time_ns}) {
+    EXPECT_EQ(broken(at(500, [&](sample_t& m) { m.*stamp = m.header.time_ns + 1; })),
+              Names({"ranges"}));
+    EXPECT_EQ(broken(at(500, [&](sample_t& m) { m.*stamp = m.header.time_ns - longest; })),
+              Names({"pieces"}));
+    EXPECT_EQ(broken(at(500, [&](sample_t& m) { m.*stamp = m.header.time_ns - longest + 1; })),
+              Names());
+    EXPECT_EQ(broken(at(500, [&](sample_t& m) { m.*stamp = 0; })), Names());  // with the sample
+  }
+  EXPECT_EQ(broken(at(500, [](sample_t& m) { m.faults = 2; })), Names({"faults"}));
+  EXPECT_EQ(broken(at(500, [](sample_t& m) { m.faults = 8; })), Names({"ranges", "faults"}));
+  EXPECT_EQ(broken([](int, sample_t& m) {
+              m.command_source = 7;
+              return true;
+            }),
+            Names({"names commands"}));
   EXPECT_EQ(broken(at(500, [](sample_t& m) { m.switches = 1; })), Names({"safety loops"}));
   EXPECT_EQ(broken(at(500, [](sample_t& m) { m.adc[6] = 0; })), Names({"pressure"}));
   EXPECT_EQ(broken([](int, sample_t& m) {

@@ -21,6 +21,13 @@ std::string strange(const sample_t& m) {
   for (int i = 0; i < kMaxJoints; ++i)
     if (!std::isfinite(m.q[i]) || std::abs(m.q[i]) > 1e3) return fmt::format("q[{}] {}", i, m.q[i]);
   if (m.header.sequence < 0) return fmt::format("sequence {}", m.header.sequence);
+  for (const auto& [name, time] : {std::pair("legs", m.legs_time_ns),
+                                   {"wrench", m.wrench_time_ns},
+                                   {"joints", m.joints_time_ns}})
+    if (time < 0 || time > m.header.time_ns)
+      return fmt::format("{}_time_ns {} at time_ns {}", name, time, m.header.time_ns);
+  if (m.faults < 0 || m.faults > static_cast<int>(kAllPieces))
+    return fmt::format("faults {}", m.faults);
   return fmt::format("temperature {}", m.temperature);
 }
 
@@ -71,6 +78,9 @@ void SampleJudge::judge(const sample_t& m, std::int64_t now) {
     tick_ = tick;
   }
   if (m.answers != -1) ++answering_;
+  if (m.command_source == setup_.header.source) ++naming_;
+  faults_ |= m.faults;
+  if (const auto sample = fromMessage(m)) oldest_ = std::max(oldest_, sample->oldest());
   switches_ &= static_cast<std::uint32_t>(m.switches);
   pressure_.add(m.adc[6]);
   for (std::size_t i = 0; i < 6; ++i) {
@@ -120,6 +130,12 @@ std::vector<Requirement> SampleJudge::verdict(std::int64_t now) const {
   add("clock", "every sample later, as fast as time goes",
       fmt::format("{} not later, {:.4f} s a second", stood_still_, pace),
       stood_still_ == 0 && std::abs(pace - 1.0) < kClockError);
+  add("pieces", fmt::format("none older than {:.0f} ms", longest),
+      fmt::format("{:.1f} ms", static_cast<double>(oldest_) * kMilliseconds),
+      static_cast<double>(oldest_) * kMilliseconds < longest);
+  add("faults", "0: every piece is well", fmt::format("{}", faults_), faults_ == 0);
+  add("names commands", "command_source as in ours", fmt::format("in {} samples", naming_),
+      naming_ > 0);
   add("ranges", "as lcmtypes/sample_t.lcm", out_of_range_.empty() ? "all within" : out_of_range_,
       out_of_range_.empty());
   const bool closed = (switches_ & kAllSwitchesClosed) == kAllSwitchesClosed;

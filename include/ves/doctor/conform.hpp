@@ -42,8 +42,10 @@ class SampleJudge {
   setup_t setup_;
   std::int64_t start_;  // [ns]
   std::optional<header_t> first_, last_;
-  std::int64_t taken_ = 0, malformed_ = 0, others_ = 0, backwards_ = 0, lost_ = 0,
-               answering_ = 0;                      // [-]
+  std::int64_t taken_ = 0, malformed_ = 0, others_ = 0, backwards_ = 0, lost_ = 0, answering_ = 0,
+               naming_ = 0;                         // [-]
+  std::int64_t oldest_ = 0;                         // [ns] a piece
+  std::int32_t faults_ = 0;                         // of all samples
   std::int64_t first_heard_ = 0, heard_ = 0;        // [ns]
   std::int64_t longest_gap_ = 0, stood_still_ = 0;  // [ns], [-]
   std::int64_t tick_ = -1;                          // the last with a sample
