@@ -135,9 +135,7 @@ struct Options {
     if (force) all.push_back("controller.stability=forced");
     Experiment experiment =
         loadExperiment(findScenario(scenario, configFolder()), all, calibration, masses, servo);
-    if (!experiment.key_file.empty() && BusAddress(process.url).key_file.empty())
-      process.url +=
-          (process.url.find('?') == std::string::npos ? "?key=" : "&key=") + experiment.key_file;
+    process.url = withKey(process.url, experiment.key_file);
     return experiment;
   }
 };

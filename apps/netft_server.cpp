@@ -60,6 +60,9 @@ void sleepUntil(std::int64_t time) {
   clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr);
 }
 
+constexpr std::int64_t kSilence = 100'000'000;   // [ns]
+constexpr std::uint32_t kNoSensor = 0x80000010;  // error; no data from the sensor
+
 void announce(const NetFtServer& server, const NetFtServer::Options& options) {
   fmt::print("records on {}:{} (UDP), {} a second to who asks; http://{}:{}/netftapi2.xml\n",
              options.address, server.port(), options.rate, options.address, server.httpPort());
@@ -77,17 +80,24 @@ void serveLog(NetFtServer& server, RecordedWrench& wrench) {
   }
 }
 
-/// The sensor of the machine on the bus; until one is there, as it is at rest.
+/// The sensor of the machine on the bus; until one is there, as it is at rest. One that has fallen
+/// silent is at fault.
 void serveBus(NetFtServer& server, const Experiment& experiment, const std::string& url) {
   plant::Plant at_rest(experiment.plant);
   at_rest.sample();
-  server.set(at_rest.truth().F_So_S);
-  Bus bus(url);
+  Wrench wrench = at_rest.truth().F_So_S;
+  std::int64_t heard = 0;  // [ns]
+  Bus bus(withKey(url, experiment.key_file));
   bus.subscribe(channel::kTruth, [&](const std::string&, const void* data, std::uint32_t size) {
-    if (const auto truth = decode<truth_t>(data, size)) server.set(reading(*truth));
+    if (const auto truth = decode<truth_t>(data, size)) {
+      wrench = reading(*truth);
+      heard = monotonicNow();
+    }
   });
   while (!stop_requested) {
     bus.drain();
+    const bool silent = heard > 0 && monotonicNow() - heard > kSilence;
+    server.set(wrench, silent ? kNoSensor : 0);
     server.serve(monotonicNow());
     sleepUntil(server.due());
   }

@@ -550,11 +550,28 @@ TEST_F(Composed, StampsOfAnotherHostsClockAreTheTimeOfArrival) {
     m.q[0] = off > 0 ? 0.1 : 0.2;
     m.temperature = 20.0;
     m.header = header({5, 5}, ++sequence_, monotonicNow() + off);
+    m.joints_time_ns = m.header.time_ns;
     const std::int64_t before = monotonicNow();
     driver.publish(channel::kJoints, m);
     hear(bus, machine, [&](const Sample& s) { return s.q(0) == m.q[0]; });
     EXPECT_GE(machine.sample()->joints_time, before - 1'000'000);
     EXPECT_LE(machine.sample()->joints_time, monotonicNow());
+  }
+}
+
+TEST_F(Composed, AReadingThatTheDriverCallsOldIsOldWhateverItsClock) {
+  Bus bus(kDefaultUrl), driver(kDefaultUrl);
+  Machine machine(test::experiment("z_sine", {"machine.robot=external"}), bus);
+  constexpr std::int64_t kOld = 250'000'000;
+  for (const std::int64_t off : {std::int64_t{0}, std::int64_t{3'600'000'000'000}}) {
+    sample_t m{};
+    m.q[0] = off > 0 ? 0.3 : 0.4;
+    m.temperature = 20.0;
+    m.header = header({5, 5}, ++sequence_, monotonicNow() + off);
+    m.joints_time_ns = m.header.time_ns - kOld;
+    driver.publish(channel::kJoints, m);
+    hear(bus, machine, [&](const Sample& s) { return s.q(0) == m.q[0]; });
+    EXPECT_GE(machine.sample()->oldest(), kOld);
   }
 }
 

@@ -18,6 +18,7 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 Sample numbered(std::int64_t sequence) {
   Sample s;
   s.sequence = sequence;
+  s.time = s.legs_time = s.wrench_time = s.joints_time = sequence * 10'000'000;
   return s;
 }
 

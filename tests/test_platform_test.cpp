@@ -29,8 +29,9 @@ class Bench {
     in_.order.request = Request::kStart;
   }
   const TickState& tick() {
-    ++in_.sample.sequence;
-    in_.sample.adc[0] ^= 1;  // alive
+    Sample& s = in_.sample;
+    s.time = s.legs_time = s.wrench_time = s.joints_time = ++s.sequence * 10'000'000;
+    s.adc[0] ^= 1;  // alive
     const TickState& state = platform_.tick(in_);
     ++in_.tick;
     in_.order.request = Request::kNone;

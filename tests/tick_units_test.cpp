@@ -52,6 +52,7 @@ TEST(TickClock, IdleTicksMayBePassedOverAndAreNotMissed) {
 Sample numbered(std::int64_t sequence) {
   Sample s;
   s.sequence = sequence;
+  s.time = s.legs_time = s.wrench_time = s.joints_time = sequence * 10'000'000;
   return s;
 }
 

@@ -89,7 +89,8 @@ int main(int argc, char** argv) {
   std::signal(SIGTERM, [](int) { over = 1; });
   try {
     if (argc < 2) throw InputError("usage: legs_driver SCENARIO [URL]");
-    drive(loadExperiment(findScenario(argv[1], "config")), argc > 2 ? argv[2] : kDefaultUrl);
+    const Experiment experiment = loadExperiment(findScenario(argv[1], "config"));
+    drive(experiment, withKey(argc > 2 ? argv[2] : kDefaultUrl, experiment.key_file));
     return 0;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "legs_driver: %s\n", error.what());

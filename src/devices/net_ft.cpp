@@ -122,7 +122,11 @@ void NetFt::watchCalibration() {
     usleep(20'000);
     if (monotonicNow() < next) continue;
     try {
-      if (netFtCalibration(fetchNetFtXml(address_, kPatience)) != calibration_) changed_ = true;
+      const NetFtCalibration now = netFtCalibration(fetchNetFtXml(address_, kPatience));
+      if (now != calibration_ && !changed_.exchange(true))
+        fmt::print(stderr,
+                   "{}: its calibration was {} and is {} now: a fault until it is read anew\n",
+                   nameOf(address_, address_.port), calibration_.serial, now.serial);
     } catch (const InputError&) {  // a busy web page is no fault; its records say how it is
     }
     next = monotonicNow() + kLookAgain;

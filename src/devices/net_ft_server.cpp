@@ -74,6 +74,7 @@ void NetFtServer::serve(std::int64_t now) {
     moments_ = 0;
   }
   for (; due() <= now; ++moments_) sendRecord();
+  for (; moments_ >= options_.rate; moments_ -= options_.rate) start_ += 1'000'000'000;
 }
 
 void NetFtServer::takeRequests() {

@@ -23,7 +23,9 @@ BusPiece::BusPiece(Bus& bus, const std::string& channel) {
 
 std::int64_t BusPiece::stamp(std::int64_t theirs) const noexcept {
   constexpr std::int64_t kLongest = 100'000'000;  // [ns] on its way within a host
-  return theirs <= arrival_ && arrival_ - theirs < kLongest ? theirs : arrival_;
+  const std::int64_t left = newest_->time;
+  const bool same_clock = left <= arrival_ && arrival_ - left < kLongest;
+  return (same_clock ? left : arrival_) - (left - theirs);
 }
 
 LegsOnBus::LegsOnBus(Bus& bus) : piece_(bus, channel::kLegs) {}

@@ -35,7 +35,7 @@ double positive(std::string_view xml, const std::string& tag) {
   const std::string text(textOf(xml, tag));
   char* end = nullptr;
   const double value = std::strtod(text.c_str(), &end);
-  if (text.empty() || *end != '\0' || !(value > 0.0) || !(value < 1e12))
+  if (text.empty() || *end != '\0' || !(value > 1e-6) || !(value < 1e12))
     throw InputError(
         fmt::format("netftapi2.xml: {}: '{}', want a number above 0", tag, text.substr(0, 40)));
   return value;

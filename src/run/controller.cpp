@@ -54,6 +54,7 @@ void putAges(timing_t& t, const Sample& sample, std::int64_t sample_time, const 
 RunResult runController(const Experiment& experiment, const ProcessOptions& options,
                         const Watch& watch) {
   warnOfOpenBus("controller", options.url);
+  refuseKeyedLockstep(options);
   const Identity self = Identity::draw();
   Bus bus(options.url);
   ControllerLink link(bus, self);

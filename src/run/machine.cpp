@@ -138,6 +138,7 @@ void runPlant(const Experiment& experiment, const ProcessOptions& options,
               const std::function<bool()>& stop) {
   if (options.lockstep) requireSimulated(experiment);
   warnOfOpenBus("plant", options.url);
+  refuseKeyedLockstep(options);
   MachineProcess machine(experiment, options);
   if (options.lockstep)
     machine.inLockstep(stop);

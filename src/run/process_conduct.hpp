@@ -8,7 +8,7 @@
 #include <cstdio>
 
 #include "ves/realtime/realtime.hpp"
-#include "ves/transport/bus.hpp"
+#include "ves/run/run.hpp"
 
 namespace ves {
 
@@ -21,6 +21,13 @@ inline void enableRealtime(const char* who, int priority, bool required) {
 inline void warnOfOpenBus(const char* who, const std::string& url) {
   if (const std::string warning = openBusWarning(url); !warning.empty())
     fmt::print(stderr, "{}: {}\n", who, warning);
+}
+
+/// Throws InputError.
+inline void refuseKeyedLockstep(const ProcessOptions& options) {
+  if (options.lockstep && !BusAddress(options.url).key_file.empty())
+    throw InputError(fmt::format(
+        "--url {}: lockstep stays on one machine; want no key, or no --lockstep", options.url));
 }
 
 }  // namespace ves

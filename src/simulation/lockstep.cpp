@@ -13,6 +13,8 @@ bool plausible(const Sample& s) noexcept {
   for (const std::int32_t count : s.legs)
     good = good && count >= 0 && count <= plant::Temposonics::kMaxCount;
   for (const double q : s.q) good = good && q >= -kMaxJointValue && q <= kMaxJointValue;
+  constexpr std::int64_t kMaxTime = INT64_MAX / 8;  // [ns] 36 years
+  good = good && s.time <= kMaxTime;
   for (const std::int64_t t : {s.legs_time, s.wrench_time, s.joints_time})
     good = good && t >= 0 && t <= s.time;
   good = good && s.faults <= kAllPieces;

@@ -5,6 +5,7 @@
 #include <sodium.h>
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
@@ -82,8 +83,9 @@ bool Key::signedBy(const std::string& channel, const std::uint8_t* message,
 
 bool ReplayGuard::fresh(const std::string& channel, const std::uint8_t* message) noexcept {
   const Sender now{std::hash<std::string>()(channel), numberAt(message, kSourceAt),
-                   numberAt(message, kEpochAt), numberAt(message, kSequenceAt)};
-  const bool once = channel == channel::kRobot;
+                   numberAt(message, kEpochAt), numberAt(message, kSequenceAt), messages_};
+  const bool once = channel == channel::kRobot || channel == channel::kOperator;
+  ++messages_;
   for (std::size_t i = 0; i < count_; ++i) {
     Sender& last = senders_[i];
     if (last.channel != now.channel || last.source != now.source) continue;
@@ -92,8 +94,18 @@ bool ReplayGuard::fresh(const std::string& channel, const std::uint8_t* message)
     if (newer) last = now;
     return newer;
   }
-  if (count_ == kSenders) return false;
-  senders_[count_++] = now;
+  // A sender that was forgotten is not let in again: it may be a recording.
+  if (now.epoch <= forgotten_) return false;
+  if (count_ < kSenders) {
+    senders_[count_++] = now;
+    return true;
+  }
+  Sender& silent =
+      *std::min_element(senders_.begin(), senders_.end(),
+                        [](const Sender& a, const Sender& b) { return a.heard < b.heard; });
+  if (now.epoch <= silent.epoch) return false;
+  forgotten_ = std::max(forgotten_, silent.epoch);
+  silent = now;
   return true;
 }
 

@@ -46,9 +46,10 @@ std::string registry() {
   const std::string folder =
       runtime && *runtime ? std::string(runtime) + "/ves" : fmt::format("/tmp/ves-{}", geteuid());
   struct stat info {};
-  const bool made = mkdir(folder.c_str(), 0700) == 0 || errno == EEXIST;
-  if (!made || lstat(folder.c_str(), &info) != 0 || !S_ISDIR(info.st_mode) ||
-      info.st_uid != geteuid() || (info.st_mode & (S_IRWXG | S_IRWXO)))
+  if (mkdir(folder.c_str(), 0700) != 0 && errno != EEXIST)
+    throw InputError(fmt::format("--join: {}: {}", folder, std::strerror(errno)));
+  if (lstat(folder.c_str(), &info) != 0 || !S_ISDIR(info.st_mode) || info.st_uid != geteuid() ||
+      (info.st_mode & (S_IRWXG | S_IRWXO)))
     throw InputError(fmt::format("--join: {}: want a folder that only this user can use", folder));
   return folder;
 }
@@ -56,7 +57,7 @@ std::string registry() {
 void require(bool good, const char* what) {
   if (!good)
     throw InputError(
-        fmt::format("--private-bus: {}: {}; this machine does not let a process have a "
+        fmt::format("private bus: {}: {}; this machine does not let a process have a "
                     "network of its own",
                     what, std::strerror(errno)));
 }

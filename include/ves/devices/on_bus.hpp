@@ -17,8 +17,9 @@ class BusPiece {
 
   /// Nothing before the first sample.
   const std::optional<Sample>& newest() const noexcept { return newest_; }
-  /// [ns] when a part was taken: the driver's own stamp, where its clock can be this host's, else
-  /// when the message came.
+  /// [ns] of this host's clock when a part was taken that the driver stamped `theirs`. How old it
+  /// was when it left, the driver's own clock says; it left when its header says, where that clock
+  /// can be this host's, else when it came.
   std::int64_t stamp(std::int64_t theirs) const noexcept;
   std::int64_t arrival() const noexcept { return arrival_; }  // [ns]
 

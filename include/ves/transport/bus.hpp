@@ -33,6 +33,9 @@ struct BusAddress {
 /// One line where anybody in reach can command the legs: ttl above 0, and no key; else empty.
 std::string openBusWarning(const std::string& url);
 
+/// The URL with the scenario's key, unless it names one.
+std::string withKey(const std::string& url, const std::string& key_file);
+
 /// Messages that a bus with a key did not hand on.
 struct Refused {
   std::int64_t forged = 0;    // [-] not signed with the key, or changed since
@@ -92,6 +95,12 @@ class Bus {
   std::optional<Key> key_;
   lcm::LCM lcm_;
   ReplayGuard guard_;
+  struct Seen {
+    const void* data = nullptr;
+    std::int64_t time = -1;  // [us]
+    bool let = false;
+  };
+  Seen seen_;
   Refused refused_;
   std::int64_t arrival_ = 0;  // [ns]
   std::vector<std::unique_ptr<Subscriber>> subscribers_;
@@ -182,9 +191,9 @@ class PlantLink {
   /// A controller keeps the legs until it lets go or is silent for so long.
   static constexpr std::int64_t kSilence = 500'000'000;  // [ns]
 
-  /// Commands and orders that name another machine than `self` are not for this one; on a bus with a
-  /// key they have to name it: those of an earlier machine are recordings. The driver of one piece,
-  /// which is not the machine that they name, has no `self`.
+  /// Commands and orders that name another machine than `self` are not for this one; on a bus with
+  /// a key they have to name it: those of an earlier machine are recordings. The driver of one
+  /// piece, which is not the machine that they name, has no `self`.
   PlantLink(Bus& bus, const std::optional<Identity>& self);
 
   /// The plant's clock, by which silence counts.

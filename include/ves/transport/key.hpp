@@ -33,19 +33,23 @@ class Key {
 /// What each sender said last on each channel: nothing older is taken again.
 class ReplayGuard {
  public:
-  static constexpr std::size_t kSenders = 256;  // [-] and channels; more are refused
+  static constexpr std::size_t kSenders =
+      256;  // [-] and channels; then the most silent is forgotten
 
   /// `message` begins with fingerprint and header_t. The newest one may come again, as messages do
-  /// that wait for an answer; of orders to the robot, which begin a motion each, it may not.
+  /// that wait for an answer; of orders, which begin a motion each, it may not.
   bool fresh(const std::string& channel, const std::uint8_t* message) noexcept;
 
  private:
   struct Sender {
     std::size_t channel;  // hash
     std::int64_t source, epoch, sequence;
+    std::int64_t heard;  // [-] number of the message
   };
   std::array<Sender, kSenders> senders_;
   std::size_t count_ = 0;
+  std::int64_t messages_ = 0;
+  std::int64_t forgotten_ = INT64_MIN;  // the latest epoch of those
 };
 
 }  // namespace ves
