@@ -45,9 +45,9 @@ class Run:
         while at + 28 <= len(data):
             _, _, _, channel, size = struct.unpack(">IqqII", data[at:at + 28])
             name, body = data[at + 28:at + 28 + channel], data[at + 28 + channel:at + 28 + channel + size]
-            if name == b"VES_OPERATOR":  # fingerprint, header_t, controller, request
-                _, sequence, source, _, _, request = struct.unpack(">qqqqqi", body[8:52])
-                out.append((source, sequence, request))
+            if name == b"VES_OPERATOR":
+                order = support.message("operator_t").decode(body)
+                out.append((order.header.source, order.header.sequence, order.request))
             at += 28 + channel + size
         return out
 

@@ -3,11 +3,13 @@
 import argparse
 import base64
 import csv
+import importlib
 import os
 import pathlib
 import socket
 import struct
 import subprocess
+import sys
 import tempfile
 import unittest
 import xml.etree.ElementTree as xml
@@ -38,6 +40,13 @@ def ves(*arguments, **how):
     how.setdefault("stdout", subprocess.DEVNULL)
     return subprocess.Popen([str(options.build / "apps/ves"), *map(str, arguments)], text=True,
                             env=dict(os.environ, VES_CONFIG_DIR=str(ROOT / "config")), **how)
+
+
+def message(name):
+    """A type of lcmtypes/, as lcm-gen writes it."""
+    if str(options.build / "python") not in sys.path:
+        sys.path.insert(0, str(options.build / "python"))
+    return getattr(importlib.import_module(f"ves.{name}"), name)
 
 
 def rows(folder, key):
