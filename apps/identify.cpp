@@ -8,6 +8,7 @@
 #include "ves/config/masses.hpp"
 #include "ves/config/servo.hpp"
 #include "ves/identification/scenario.hpp"
+#include "ves/identification/sensor_timing.hpp"
 #include "ves/identification/servo_identification.hpp"
 #include "ves/results/static_intervals.hpp"
 #include "ves/run/iterative_compensation.hpp"
@@ -132,21 +133,31 @@ int servo(const std::string& log, const std::string& file) {
   printDamage(series.damage);
   const ControllerConfig& c = series.experiment.controller;
   // The longest stretch under command without a gap.
-  LegRecord longest, record;
+  struct {
+    LegRecord legs;
+    ShakeRecord shake;
+  } longest, record;
   std::int64_t last = -1;
   for (const Row& row : series.rows) {
-    if (!row.state.engaged || !row.has_sample || row.state.header.sequence != last + 1) record = {};
+    const auto sample = row.has_sample ? fromMessage(row.sample) : std::nullopt;
+    const bool usable = row.state.engaged && sample;
+    if (!usable || row.state.header.sequence != last + 1) record = {};
     last = row.state.header.sequence;
-    if (!row.state.engaged || !row.has_sample) continue;
+    if (!usable) continue;
     LegCounts sent{}, read{};
     std::copy_n(row.state.counts, kLegs, sent.begin());
     std::copy_n(row.sample.legs, kLegs, read.begin());
-    record.reference.push_back(legLengths(c.legs, sent));
-    record.length.push_back(legLengths(c.legs, read));
-    if (record.length.size() > longest.length.size()) longest = record;
+    record.legs.reference.push_back(legLengths(c.legs, sent));
+    record.legs.length.push_back(legLengths(c.legs, read));
+    record.shake.time.push_back(row.state.machine_time_ns);
+    record.shake.reference.push_back(legLengths(c.legs, sent));
+    record.shake.sample.push_back(*sample);
+    record.shake.bias.push_back(Vec6::Map(row.state.bias));
+    if (record.legs.length.size() > longest.legs.length.size()) longest = record;
   }
   const ServoEstimate found = orRefuse(log, [&] {
-    return identifyServo(c.servo, static_cast<double>(c.period) * kSecondPerNanosecond, longest);
+    return identifyServo(c.servo, static_cast<double>(c.period) * kSecondPerNanosecond,
+                         longest.legs);
   });
   fmt::print("{:>3}{:>22}{:>22}{:>20}{:>20}{:>12}\n", "leg", "extending [1/s]", "retracting [1/s]",
              "tau [ms]", "delay [ms]", "rest [um]");
@@ -159,9 +170,24 @@ int servo(const std::string& log, const std::string& file) {
                cell(&ServoModel::retract, 1.0), cell(&ServoModel::tau, 1e3),
                cell(&ServoModel::delay, 1e3), found.residual(i) * 1e6);
   }
+  ServoRecord kept{std::time(nullptr), found.servo, found.deviation};
+  try {
+    ControllerConfig known = c;
+    known.servo = found.servo;
+    const SensorEstimate sensor = identifySensor(known, longest.shake);
+    kept.servo.sensor_delay = sensor.delay;
+    kept.servo.sensor_scale = sensor.scale;
+    kept.deviation.sensor_delay = sensor.delay_deviation;
+    kept.deviation.sensor_scale = sensor.scale_deviation;
+    fmt::print(
+        "wrench: {:.0f} +- {:.0f} us later than the servos and its filter say; shows {:.4f} +- "
+        "{:.4f} of the robot's inertia\n",
+        1e6 * sensor.delay, 1e6 * sensor.delay_deviation, sensor.scale, sensor.scale_deviation);
+  } catch (const std::domain_error& why) {
+    fmt::print("wrench: its time is not told, {}\n", why.what());
+  }
   if (file.empty()) return kDone;
-  const std::string yaml = write({std::time(nullptr), found.servo, found.deviation});
-  return keep(file, yaml, readServo);
+  return keep(file, write(kept), readServo);
 }
 
 int iterate(Options& load, const IterativeOptions& options, const std::string& file) {

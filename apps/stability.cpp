@@ -43,10 +43,14 @@ int showLoop(const Experiment& e) {
     const Margins m = margins(extending ? v.extending : v.retracting);
     const auto least = [](bool most) { return most ? "at least " : ""; };
     fmt::print(
-        "stable, legs {}: where it is worst, bears {}{:.2f} times the robot's inertia, and {}{} "
-        "ticks of further delay\n",
-        extending ? "extending" : "retracting", least(m.gain >= Margins::kMostGain), m.gain,
-        least(m.delay == Margins::kMostDelay), m.delay);
+        "stable, legs {}: where it is worst, bears {}{:.0f} % of the robot's inertia, {}{:.0f} % "
+        "of "
+        "the servos' gain, a wrench {}{:.2f} ms earlier or {}{:.2f} ms later than believed, and "
+        "{}{} ticks of further delay\n",
+        extending ? "extending" : "retracting", least(m.gain >= Margins::kMostGain), 100.0 * m.gain,
+        least(m.servo_gain >= Margins::kMostGain), 100.0 * m.servo_gain,
+        least(m.early >= Margins::kMostTime), 1e3 * m.early, least(m.late >= Margins::kMostTime),
+        1e3 * m.late, least(m.delay == Margins::kMostDelay), m.delay);
   }
   return kDone;
 }
@@ -75,6 +79,8 @@ const Parameter kParameters[] = {
      }},
     {"gain_error", "servo gain, times the controller's model", 0.01, 100.0,
      [](Loop& l, const Loop& o, double v) { l.velocity_gain = v * o.velocity_gain; }},
+    {"late", "wrench later than believed [ms]", -20.0, 20.0,
+     [](Loop& l, const Loop& o, double v) { l.late = o.late + 1e-3 * v; }},
     {"delay", "further delay [ticks]", 0.0, 50.0,
      [](Loop& l, const Loop& o, double v) { l.delay = o.delay + static_cast<int>(v); }},
     {"filter", "cut-off of Filter 3 [rad/s]", 0.0, 10000.0,
@@ -230,8 +236,9 @@ int stabilityCommand(int argc, char** argv) {
       "scenario figure E.4");
   std::string scenario, x = "mass=0.1:4", y = "frequency=0.2:3", out = "ves-runs/stability";
   map->add_option("scenario", scenario, "name in config/scenarios, or a .yaml file");
-  map->add_option("--x", x,
-                  "NAME=FROM:TO: mass, rate, K_P, delay, filter, sensor, frequency, modes")
+  map->add_option(
+         "--x", x,
+         "NAME=FROM:TO: mass, mass_error, rate, K_P, late, delay, filter, sensor, frequency, modes")
       ->capture_default_str();
   map->add_option("--y", y, "the same")->capture_default_str();
   map->add_option("--set", options.overrides, "KEY.PATH=VALUE as if it stood in the scenario")

@@ -64,6 +64,7 @@ TEST(Config, EveryMachineNumberIsTheReportsOrTagged) {
                                         "switches",
                                         "filter_cutoff_rad_per_s",
                                         "cutoff_hz",
+                                        "readings_per_tick",
                                         "noise",
                                         "swing_c",
                                         "period_h",

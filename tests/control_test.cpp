@@ -237,24 +237,11 @@ TEST(AdmittanceModel, IsWhereItIsResetBeforeItsFirstStep) {
   const ControllerConfig c = experiment("puma_on_table_4_1").controller;
   const Vec6 x = Vec6::LinSpaced(-0.03, 0.02);
   for (const double ahead : {0.0, 0.02}) {
-    AdmittanceModel model(c.admittance, kT, ahead);
+    AdmittanceModel model(c.admittance, kT);
     model.step(Wrench::from(Vec6::Constant(10.0)));
-    model.reset(x);
+    model.reset(x, Mat6::Zero(), ahead);
     EXPECT_EQ(model.motion().x, x);
     EXPECT_EQ(model.motion().x_dot, Vec6::Zero());
-  }
-}
-
-TEST(AdmittanceModel, LooksAheadOnlyWhenAskedTo) {
-  const ControllerConfig c = experiment("puma_on_table_4_1").controller;
-  AdmittanceModel plain(c.admittance, kT), ahead(c.admittance, kT, 0.02);
-  const Wrench F = Wrench::from(Vec6::LinSpaced(5.0, -20.0));
-  plain.reset(Vec6::Zero());
-  ahead.reset(Vec6::Zero());
-  for (int n = 0; n < 50; ++n) {
-    plain.step(F);
-    ahead.step(F);
-    ASSERT_EQ(plain.motion().x, ahead.motion().x);
   }
 }
 

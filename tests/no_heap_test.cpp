@@ -23,13 +23,14 @@ TEST(MallocGuard, CountsAnAllocation) {  // the test that the others can fail
 
 constexpr const char* kCompensated =
     "controller.compensation={feed_forward: true, observer: true, inertia: true, "
-    "mass_update_ticks: 3, ramp_s: 0.5, reading_jitter_s: 0.001}";
+    "mass_update_ticks: 3, ramp_s: 0.5, reading_jitter_s: 0.001, timing_error_s: 0.0005, "
+    "gain_error: 0.05, mass_error: 0.05}";
 
 class NoHeap : public testing::TestWithParam<const char*> {};
 
 TEST_P(NoHeap, FromArmingToParking) {
   for (const char* base :
-       {"seed=1", kCompensated,
+       {"seed=1", kCompensated, "sensor.readings_per_tick=4",
         "base={mass_diagonal: [500,500,500,250,250,250], damping_diagonal: "
         "[500,400,300,200,100,90], stiffness_diagonal: [1500,2500,4000,1500,1000,2000]}"}) {
     const Experiment e = experiment(GetParam(), {base});

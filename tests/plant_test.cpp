@@ -281,6 +281,43 @@ TEST(Plant, ALongLeapIsAsGoodAsManySteps) {  // what is still is passed over; wh
   EXPECT_LT(many.legs[0], many.legs[1] - 4000);
 }
 
+TEST(Plant, AveragedReadingsAreThoseOfTheMiddlesOfTheWindowsParts) {
+  // Beside a plant that is read at just those times: the same steps, the same noise.
+  Experiment e = experiment("puma_on_table_4_1", {"sensor.readings_per_tick=5"});
+  plant::PlantConfig single = e.plant;
+  single.sensor_readings = 1;
+  plant::Plant mean(e.plant), read(single);
+  LegCommand command;
+  command.engaged = true;
+  const Vec6 home = legLengths(e.plant.geometry, e.plant.geometry.fromHome(e.plant.initial_pose));
+  std::array<double, kWrenchChannels> sums{};
+  for (std::int64_t n = 0; n < 50; ++n) {
+    const double z = 0.01 * std::sin(0.3 * static_cast<double>(n));
+    command.counts = legCounts(e.controller.legs, home.array() + z);
+    mean.command(command);
+    read.command(command);
+    const auto tick = n * 10'000'000;
+    sums.fill(0.0);
+    for (int k = 0; k < 5; ++k) {
+      read.advance(tick + 1'000'000 + k * 2'000'000);
+      const Sample s = read.sample();
+      for (std::size_t i = 0; i < kWrenchChannels; ++i) sums[i] += s.adc[i] / 5.0;
+    }
+    mean.advance(tick + 10'000'000);
+    const Sample s = mean.sample();
+    EXPECT_EQ(s.wrench_time, s.time);
+    for (std::size_t i = 0; i < kWrenchChannels; ++i)
+      ASSERT_NEAR(s.adc[i], sums[i], 0.5 + 1e-9) << n << " " << i;
+    read.advance(tick + 10'000'000);
+    read.sample();
+  }
+  // Between two windows' ends the newest that is over counts.
+  mean.advance(50 * 10'000'000 + 3'500'000);
+  EXPECT_EQ(mean.sample().wrench_time, 50 * 10'000'000 + 2'000'000);
+  mean.advance(50 * 10'000'000 + 4'000'000);
+  EXPECT_EQ(mean.sample().wrench_time, 50 * 10'000'000 + 4'000'000);
+}
+
 TEST(Plant, SameSeedSameBytesOtherSeedOthers) {
   const auto run = [](const char* seed) {
     const Experiment e = experiment("puma_on_table_4_1", {seed});

@@ -220,8 +220,8 @@ TEST(SafetyMonitor, NothingThatIsNotFinitePasses) {
   const ControllerConfig c = experiment("puma_on_table_4_1").controller;
   const Proposal good = inverseKinematics(c.geometry, atRest(Vec6::Zero()));
   const auto finite = [&](const Proposal& p, const Sample& sample, const Wrench& dynamic) {
-    SampleStream samples;
-    samples.update(sample, false, false);
+    SampleStream samples(c.period);
+    samples.update(sample, 0, false, false);
     const SafetyMonitor monitor(c.safety, c.geometry, kT);
     return !monitor
                 .check(p, {good.legs.L, good.legs.L}, samples, LegEstimator(c), dynamic,

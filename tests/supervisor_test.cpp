@@ -31,9 +31,9 @@ const ControllerConfig& puma() {
 struct Desk {
   explicit Desk(const ControllerConfig& config)
       : c(config), path(c.safety, c.geometry), motion(c), bias(c), share(c.compensation, 0.01) {
-    for (int n = 0; n <= c.arming_samples; ++n) stream.update(numbered(n), false, false);
+    for (int n = 0; n <= c.arming_samples; ++n) stream.update(numbered(n), 0, false, false);
   }
-  Situation now() { return {c, path, tick, stream.freshTicks(), dynamic, M_1, L}; }
+  Situation now() { return {c, path, tick, stream.freshTicks(), dynamic, M_1, 0.0, L}; }
   Actuation act() { return {motion, bias, stream, share}; }
   TickState order(Request request, const Segment& segment = {}) {
     supervisor.handle({request, segment, {1, tick}}, now(), act());
@@ -57,7 +57,7 @@ struct Desk {
   PathChecks path;
   MotionGenerator motion;
   SensorBias bias;
-  SampleStream stream;
+  SampleStream stream{10'000'000};
   CompensationShare share;
   Supervisor supervisor;
   Wrench dynamic;
@@ -260,7 +260,7 @@ TEST(Supervisor, ACauseThatComesWhileTheStreamIsAwaitedDropsTheRequest) {
   desk.advance();
   desk.advance();
   for (int n = 100; n <= 100 + desk.c.arming_samples; ++n)
-    desk.stream.update(numbered(n), false, false);
+    desk.stream.update(numbered(n), 0, false, false);
   desk.advance();
   EXPECT_EQ(desk.supervisor.phase(), Phase::kDisarmed);
 }

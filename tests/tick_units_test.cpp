@@ -57,42 +57,42 @@ Sample numbered(std::int64_t sequence) {
 }
 
 TEST(SampleStream, AgesUntilANewSampleComes) {
-  SampleStream stream;
-  stream.update(numbered(-1), false, false);
+  SampleStream stream(10'000'000);
+  stream.update(numbered(-1), 0, false, false);
   EXPECT_FALSE(stream.fresh());  // nothing was received yet
-  stream.update(numbered(0), false, false);
+  stream.update(numbered(0), 0, false, false);
   EXPECT_TRUE(stream.fresh());
-  stream.update(numbered(0), true, false);
-  stream.update(numbered(0), true, false);
+  stream.update(numbered(0), 0, true, false);
+  stream.update(numbered(0), 0, true, false);
   EXPECT_EQ(stream.age(), 2);
   EXPECT_EQ(stream.ageBefore(), 1);
-  stream.update(numbered(1), true, false);
+  stream.update(numbered(1), 0, true, false);
   EXPECT_EQ(stream.age(), 0);
   EXPECT_EQ(stream.ageBefore(), 2);
 }
 
 TEST(SampleStream, AnOlderSampleIsNoneOnlyWhileEngaged) {
-  SampleStream stream;
-  stream.update(numbered(7), true, false);
-  stream.update(numbered(3), true, false);
+  SampleStream stream(10'000'000);
+  stream.update(numbered(7), 0, true, false);
+  stream.update(numbered(3), 0, true, false);
   EXPECT_EQ(stream.sample().sequence, 7);
-  stream.update(numbered(3), false, false);  // a machine that began anew
+  stream.update(numbered(3), 0, false, false);  // a machine that began anew
   EXPECT_EQ(stream.sample().sequence, 3);
   EXPECT_FALSE(stream.fresh());
-  stream.update(numbered(4), false, false);
+  stream.update(numbered(4), 0, false, false);
   EXPECT_TRUE(stream.fresh());
 }
 
 TEST(SampleStream, FreshTicksCountInARowAndWithoutAConflict) {
-  SampleStream stream;
-  for (int n = 0; n < 5; ++n) stream.update(numbered(n), false, false);
+  SampleStream stream(10'000'000);
+  for (int n = 0; n < 5; ++n) stream.update(numbered(n), 0, false, false);
   EXPECT_EQ(stream.freshTicks(), 5);
-  stream.update(numbered(5), false, true);
+  stream.update(numbered(5), 0, false, true);
   EXPECT_EQ(stream.freshTicks(), 0);
-  stream.update(numbered(6), false, false);
-  stream.update(numbered(6), false, false);
+  stream.update(numbered(6), 0, false, false);
+  stream.update(numbered(6), 0, false, false);
   EXPECT_EQ(stream.freshTicks(), 0);
-  stream.update(numbered(7), false, false);
+  stream.update(numbered(7), 0, false, false);
   stream.restart();
   EXPECT_EQ(stream.freshTicks(), 0);
 }
@@ -228,14 +228,14 @@ TEST(StaticLoad, GoesThroughTheSensorsFilterByTheShareOnly) {
   JointVector q = JointVector::Zero();
   StaticLoad published(puma()), none(config), all(config);
   for (StaticLoad* load : {&published, &none, &all})
-    load->update(config.payload, q, level, false, 0.0);
-  published.update(config.payload, q, tilted, true, 0.0);
-  none.update(config.payload, q, tilted, true, 0.0);
-  all.update(config.payload, q, tilted, true, 1.0);
+    load->update(config.payload, q, level, 0.01, false, 0.0);
+  published.update(config.payload, q, tilted, 0.01, true, 0.0);
+  none.update(config.payload, q, tilted, 0.01, true, 0.0);
+  all.update(config.payload, q, tilted, 0.01, true, 1.0);
   EXPECT_LT((published.wrench().stacked() - none.wrench().stacked()).norm(), 1e-12);
   EXPECT_GT((published.wrench().f - all.wrench().f).norm(), 1.0);
   EXPECT_EQ(published.counts(), all.counts());  // unfiltered: what the frozen check expects
-  for (int n = 0; n < 200; ++n) all.update(config.payload, q, tilted, true, 1.0);
+  for (int n = 0; n < 200; ++n) all.update(config.payload, q, tilted, 0.01, true, 1.0);
   EXPECT_LT((published.wrench().stacked() - all.wrench().stacked()).norm(), 1e-6);
 }
 
@@ -382,7 +382,7 @@ TEST(LegCommander, SendsTheCheckedLengthsToTheNearestCount) {
   LegMotion legs;
   legs.L = Vec6::LinSpaced(1.3, 1.7);
   legs.L_dot = Vec6::Constant(0.1);
-  commander.command(legs, true, 3, 0.0, 0.0, servo);
+  commander.command(legs, true, 3, 0.0, 0.0, servo, 0.0);
   const Vec6 sent = legLengths(c.legs, commander.command().counts);
   EXPECT_LE((sent - legs.L).cwiseAbs().maxCoeff(), 0.5 * c.legs.scale(0) * (1.0 + 1e-9));
   EXPECT_TRUE(commander.command().engaged);
@@ -391,7 +391,7 @@ TEST(LegCommander, SendsTheCheckedLengthsToTheNearestCount) {
 
   const LegCounts before = commander.command().counts;
   legs.L(2) = kNan;
-  commander.command(legs, true, 3, 0.0, 0.0, servo);
+  commander.command(legs, true, 3, 0.0, 0.0, servo, 0.0);
   EXPECT_EQ(commander.command().counts, before);
   commander.hold();
   EXPECT_EQ(commander.legs().L_dot.norm(), 0.0);
@@ -405,16 +405,16 @@ TEST(LegCommander, WithTheLagTakenOutExpectsTheCommandBroughtToNowAndStaysInside
   LegMotion legs;
   legs.L = Vec6::Constant(1.5);
   legs.L_dot = Vec6::Constant(0.1);
-  commander.command(legs, true, 0, 0.0, 1.0, servo);
+  commander.command(legs, true, 0, 0.0, 1.0, servo, 0.0);
   EXPECT_GT(commander.reference()(0), 1.5 + 0.1 / c.servo.extend(0));  // ahead by the lag at least
   EXPECT_NEAR(commander.expected(0.0, 1.0)(0), 1.5 + 0.1 * c.periodSeconds(), 1e-12);
   EXPECT_NEAR(commander.expected(c.periodSeconds(), 1.0)(0), 1.5, 1e-12);
   legs.L = Vec6::Constant(c.safety.leg_max - 1e-4);
-  commander.command(legs, true, 0, 0.0, 1.0, servo);
+  commander.command(legs, true, 0, 0.0, 1.0, servo, 0.0);
   EXPECT_EQ(commander.reference(), Vec6::Constant(c.safety.leg_max));
   legs.L = Vec6::Constant(c.safety.leg_min + 1e-4);
   legs.L_dot = Vec6::Constant(-0.1);
-  commander.command(legs, true, 0, 0.0, 1.0, servo);
+  commander.command(legs, true, 0, 0.0, 1.0, servo, 0.0);
   EXPECT_EQ(commander.reference(), Vec6::Constant(c.safety.leg_min));
 }
 
@@ -425,11 +425,11 @@ TEST(LegCommander, TakesOutWhatTheTransducersWillRound) {
   ServoObserver servo(c.servo, c.periodSeconds());
   LegMotion legs;
   legs.L = legLengths(c.legs, legCounts(c.legs, Vec6::Constant(1.5))).array() + 0.3 * scale;
-  servo.reset(legs.L);
+  servo.reset(legs.L, 0);
   LegCommander commander(c);
-  commander.command(legs, true, 0, 0.0, 1.0, servo);
+  commander.command(legs, true, 0, 0.0, 1.0, servo, 0.0);
   for (const double share : {0.0, 0.5, 1.0}) {
-    commander.command(legs, true, 0, 0.0, share, servo);
+    commander.command(legs, true, 0, 0.0, share, servo, 0.0);
     const Vec6 taken = commander.reference() - legs.L;
     EXPECT_LT((taken.array() + share * 0.3 * scale).abs().maxCoeff(), 1e-6 * scale) << share;
   }
@@ -445,7 +445,7 @@ TEST(LegCommander, CarriesWhatRoundingLeavesInAdmittanceControlOnly) {
     legs.L = Vec6::Constant(1.5 + 0.3 * c.legs.scale(0));
     double sum = 0.0;
     for (int n = 0; n < 100; ++n) {
-      commander.command(legs, true, 0, lead, 1.0, servo);
+      commander.command(legs, true, 0, lead, 1.0, servo, 0.0);
       sum += legLengths(c.legs, commander.command().counts)(0) - commander.reference()(0);
     }
     if (lead > 0.0)

@@ -5,7 +5,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
 #include <set>
 
 namespace ves {
@@ -91,6 +93,28 @@ bool holds(const ControllerConfig& controller, const plant::PlantConfig& plant,
   });
 }
 
+Uncertainty uncertaintyOf(const Compensation& c) {
+  return {c.timing_error, c.gain_error, c.mass_error};
+}
+
+/// Of the eight corners of what the belief may be off by, one where the loop grows.
+std::optional<std::array<int, 3>> cornerThatGrows(const ControllerConfig& controller,
+                                                  const plant::PlantConfig& plant,
+                                                  const std::vector<CarriedRobot>& robots) {
+  const Compensation& c = controller.compensation;
+  if (!c.inertia) return {};
+  const Uncertainty by = uncertaintyOf(c);
+  for (const int mass : {1, -1}) {
+    std::vector<CarriedRobot> others = robots;
+    for (CarriedRobot& robot : others) robot.robot_P = heavier(1.0 + mass * by.mass, robot.robot_P);
+    for (const int gain : {1, -1})
+      for (const int timing : {1, -1})
+        if (!holds(controller, plant, others, [&](Loop& l) { l = off(l, by, timing, gain); }))
+          return std::array<int, 3>{timing, gain, mass};
+  }
+  return {};
+}
+
 }  // namespace
 
 std::vector<ProgramRobot> programRobots(const ControllerConfig& controller,
@@ -113,7 +137,9 @@ std::vector<ProgramRobot> programRobots(const ControllerConfig& controller,
 }
 
 bool isStable(const ControllerConfig& controller, const plant::PlantConfig& plant) {
-  return holds(controller, plant, bodies(controller, plant), [](Loop&) {});
+  const std::vector<CarriedRobot> robots = bodies(controller, plant);
+  return holds(controller, plant, robots, [](Loop&) {}) &&
+         !cornerThatGrows(controller, plant, robots);
 }
 
 LoopVerdict assessStability(const ControllerConfig& controller, const plant::PlantConfig& plant) {
@@ -122,7 +148,14 @@ LoopVerdict assessStability(const ControllerConfig& controller, const plant::Pla
   out.stable_modes = out.modes;
   const std::vector<CarriedRobot> robots = bodies(controller, plant);
   const auto cured = [&](const auto& change) { return holds(controller, plant, robots, change); };
-  out.stable = cured([](Loop&) {});
+  out.as_believed = cured([](Loop&) {});
+  out.stable = out.as_believed;
+  if (out.as_believed)
+    if (const auto corner = cornerThatGrows(controller, plant, robots)) {
+      out.stable = false;
+      out.off = *corner;
+      out.uncertainty = uncertaintyOf(controller.compensation);
+    }
   double largest = 0.0;
   for (const Direction direction : kBoth) {
     double most = 0.0;
@@ -140,7 +173,7 @@ LoopVerdict assessStability(const ControllerConfig& controller, const plant::Pla
     out.direction = direction;
   }
   out.worst = dominantRoot(out.direction == Direction::kExtending ? out.extending : out.retracting);
-  if (out.stable) return out;
+  if (out.as_believed) return out;
   out.stable_modes = 0;
   while (out.stable_modes < out.modes &&
          cured([&](Loop& l) { l.base = softest(l.base, out.stable_modes + 1); }))
@@ -157,6 +190,15 @@ LoopVerdict assessStability(const ControllerConfig& controller, const plant::Pla
 }
 
 std::string explain(const LoopVerdict& v) {
+  if (v.as_believed)
+    return fmt::format(
+        "the loop of base, robot and machine would decay as believed, but diverge with a wrench "
+        "{:.3g} ms {}, servos {:.3g} % {} and a robot {:.3g} % {}. What cures it: better beliefs "
+        "(timing_error_s, gain_error and mass_error of controller.compensation), a lighter robot "
+        "or a heavier base",
+        1e3 * v.uncertainty.timing, v.off[0] > 0 ? "later" : "earlier", 100.0 * v.uncertainty.gain,
+        v.off[1] > 0 ? "quicker" : "slower", 100.0 * v.uncertainty.mass,
+        v.off[2] > 0 ? "heavier" : "lighter");
   Eigen::Index i = 0;
   v.worst.shape.cwiseAbs().maxCoeff(&i);
   std::string cure;

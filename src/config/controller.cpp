@@ -29,6 +29,9 @@ Compensation readCompensation(Section& controller) {
   c.mass_update = static_cast<int>(s.integer("mass_update_ticks", 1, 1'000'000));
   c.ramp = s.number("ramp_s", 0.01, 100.0);
   c.jitter = s.number("reading_jitter_s", 0.0, 0.1);
+  c.timing_error = s.number("timing_error_s", 0.0, 0.005);
+  c.gain_error = s.number("gain_error", 0.0, 0.5);
+  c.mass_error = s.number("mass_error", 0.0, 0.5);
   s.finish();
   return c;
 }

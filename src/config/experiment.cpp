@@ -105,8 +105,21 @@ Experiment build(const Value& document) {
   c.stillness.bias /= sensor.model.volts_per_count;
   c.servo = plant::nominalServo(legs.gains, legs.actuator, legs.transducer);
   c.servo.sensor_cutoff = sensor.model.cutoff;
+  if (sensor.readings > 1) {
+    if (c.period % (2 * sensor.readings) != 0)
+      root.fail("sensor", fmt::format("readings_per_tick: {} readings and their middles do not "
+                                      "divide the controller's period of {} ns evenly",
+                                      sensor.readings, c.period));
+    c.servo.sensor_window = c.periodSeconds();
+    p.sensor_readings = sensor.readings;
+    p.sensor_window = c.period;
+  }
   c.servo.jitter = c.compensation.jitter;
-  if (root.has("servo")) c.servo = withRecord(c.servo, readServo(root.section("servo")));
+  if (root.has("servo")) {
+    const ServoRecord record = readServo(root.section("servo"));
+    c.servo = withRecord(c.servo, record);
+    c.compensation = withRecord(c.compensation, record);
+  }
   c.safety = readSafety(root.section("safety"), sensor.model.volts_per_count);
   const Base base = readBase(root.section("base"));
   c.admittance = base.modes;

@@ -50,6 +50,7 @@ Sensor readSensor(Section s) {
   if (!s.flag("noise")) m.noise.setZero();
   m.cutoff = 2.0 * M_PI * s.number("cutoff_hz", 1e-3, 1e5);
   m.volts_per_count = s.number("volts_per_count", kTiny, 1.0);
+  out.readings = static_cast<int>(s.integer("readings_per_tick", 1, 100));
   m.pressure = s.number("pressure_v", -10.0, 10.0);
   m.drift = s.vector("drift_v_per_c", 6, -1.0, 1.0);
   Section climate = s.section("temperature");

@@ -43,6 +43,7 @@ Legs readLegs(Section s);
 struct Sensor {
   plant::ForceTorqueSensorModel model;
   plant::Climate climate;
+  int readings = 1;  // [-] that the machine averages over a controller period
   Transform X_PS;
   RigidBody top_plate_S;
 };

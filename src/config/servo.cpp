@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+
 #include "ves/config/calibration.hpp"
 
 namespace ves {
@@ -21,6 +23,17 @@ constexpr Key kKeys[] = {
     {"tau_s", &ServoModel::tau, 1e-4, 1.0, "of the cylinder"},
     {"delay_s", &ServoModel::delay, -0.01, 0.1, "from a tick to the LegSlave"}};
 
+/// Of the force-torque sensor; files of earlier versions have none.
+struct SensorKey {
+  const char* name;
+  double ServoModel::*value;
+  double lo, hi;
+  const char* what;
+};
+constexpr SensorKey kSensorKeys[] = {
+    {"sensor_delay_s", &ServoModel::sensor_delay, -0.01, 0.01, "of the wrench, beyond its filter"},
+    {"sensor_scale", &ServoModel::sensor_scale, 0.5, 2.0, "of the robot's inertia that it shows"}};
+
 }  // namespace
 
 std::string write(const ServoRecord& r) {
@@ -35,6 +48,10 @@ std::string write(const ServoRecord& r) {
     line(key.name, r.servo.*key.value, fmt::format("  # {}", key.what));
     line(fmt::format("{}_deviation", key.name), r.deviation.*key.value, "");
   }
+  for (const SensorKey& key : kSensorKeys)
+    if (r.deviation.*key.value > 0.0)
+      text += fmt::format("{0}: {1}  # {2}\n{0}_deviation: {3}\n", key.name, r.servo.*key.value,
+                          key.what, r.deviation.*key.value);
   return text;
 }
 
@@ -45,12 +62,32 @@ ServoRecord readServo(Section s) {
     r.servo.*key.value = s.vector(key.name, kLegs, key.lo, key.hi);
     r.deviation.*key.value = s.vector(fmt::format("{}_deviation", key.name), kLegs, 0.0, 1e3);
   }
+  for (const SensorKey& key : kSensorKeys) {
+    r.deviation.*key.value = 0.0;
+    if (!s.has(key.name)) continue;
+    r.servo.*key.value = s.number(key.name, key.lo, key.hi);
+    r.deviation.*key.value = s.number(fmt::format("{}_deviation", key.name), 0.0, 1.0);
+  }
   s.finish();
   return r;
 }
 
 ServoModel withRecord(ServoModel nominal, const ServoRecord& record) {
   for (const Key& key : kKeys) nominal.*key.value = record.servo.*key.value;
+  for (const SensorKey& key : kSensorKeys) nominal.*key.value = record.servo.*key.value;
+  return nominal;
+}
+
+Compensation withRecord(Compensation nominal, const ServoRecord& record) {
+  constexpr double kDeviations = 3.0;  // [-]
+  const auto share = [&](Vec6 ServoModel::*value) {
+    return (record.deviation.*value).cwiseQuotient(record.servo.*value).maxCoeff();
+  };
+  nominal.gain_error =
+      kDeviations * std::max(share(&ServoModel::extend), share(&ServoModel::retract));
+  if (!(record.deviation.sensor_scale > 0.0)) return nominal;
+  nominal.timing_error = kDeviations * record.deviation.sensor_delay;
+  nominal.mass_error = kDeviations * record.deviation.sensor_scale;
   return nominal;
 }
 

@@ -6,26 +6,29 @@
 namespace ves {
 
 AdmittanceControl::AdmittanceControl(const ControllerConfig& config)
-    : model_(config.admittance, config.periodSeconds(),
-             config.compensation.inertia ? wrenchDelay(config.servo, config.periodSeconds()) : 0.0),
+    : model_(config.admittance, config.periodSeconds()),
+      inertia_(config.compensation.inertia),
+      wrench_delay_(wrenchDelay(config.servo, config.periodSeconds())),
       period_(config.periodSeconds()),
       joint_moves_(config.stillness.joint),
       growth_floor_(config.safety.growth_floor),
       braking_(config.gentle.braking) {}
 
-void AdmittanceControl::begin(const Vec6& x, const Mat6& M_1) noexcept {
-  model_.reset(x, M_1);
+void AdmittanceControl::begin(const Vec6& x, const Mat6& M_1, double age) noexcept {
+  model_.reset(x, M_1, inertia_ ? age + wrench_delay_ : 0.0);
   oscillation_.reset();
 }
 
-const PathPoint<6>& AdmittanceControl::step(const Wrench& F_Po_I, const Mat6& M_1, double share,
-                                            const JointVector& q, const Vec6& last, const Vec6& L,
+const PathPoint<6>& AdmittanceControl::step(const AdmittanceInput& in, const Vec6& last,
                                             const PathChecks& checks) noexcept {
-  if (F_Po_I.stacked().allFinite()) {
-    model_.step(F_Po_I, M_1, share);
-    slowInsideEnvelope(last, L, checks);
+  if (in.F_Po_I.stacked().allFinite()) {
+    if (inertia_)
+      model_.step(in.F_Po_I, in.M_1, in.wrench.since, in.wrench.age + in.share * wrench_delay_);
+    else
+      model_.step(in.F_Po_I);
+    slowInsideEnvelope(last, in.L, checks);
     const bool held = scale_ < 1.0 && model_.kineticEnergy() > growth_floor_;
-    oscillation_.take(model_.energy(), held, q, joint_moves_, period_, growth_floor_);
+    oscillation_.take(model_.energy(), held, in.q, joint_moves_, period_, growth_floor_);
   }
   return model_.motion();
 }

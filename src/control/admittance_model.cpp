@@ -2,7 +2,9 @@
 #include "ves/control/admittance_model.hpp"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cassert>
+#include <cmath>
 
 #include "ves/math/dense.hpp"
 #include "ves/math/second_order.hpp"
@@ -11,8 +13,9 @@ namespace ves {
 
 ModalHold modalHold(const ModalModel& model, double dt) {
   const Eigen::Index k = model.stiffness.size();
-  ModalHold out{Eigen::MatrixXd::Zero(2 * k, 2 * k), Eigen::MatrixXd::Zero(2 * k, k)};
+  ModalHold out;
   if (model.damping.isDiagonal(0.0)) {
+    out = {Eigen::MatrixXd::Zero(2 * k, 2 * k), Eigen::MatrixXd::Zero(2 * k, k)};
     for (Eigen::Index i = 0; i < k; ++i) {
       const SecondOrderHold one = discretise(model.stiffness(i), model.damping(i, i), dt);
       out.Phi(i, i) = one.Phi(0, 0);
@@ -24,14 +27,22 @@ ModalHold modalHold(const ModalModel& model, double dt) {
     }
     return out;
   }
-  // exp([A B; 0 0] T) = [Phi Gamma; 0 I] (van Loan).
+  // exp([A B; 0 0] T) = [Phi Gamma; 0 I] (van Loan), of {w eta, eta', u/w} with w the fastest
+  // mode's frequency: as they are, stiffness beside ones costs four digits.
+  const double w = std::max(1.0, std::sqrt(model.stiffness.maxCoeff()));
   Eigen::MatrixXd M = Eigen::MatrixXd::Zero(3 * k, 3 * k);
   M.block(0, k, k, k).setIdentity();
-  M.block(k, 0, k, k) = -Eigen::MatrixXd(model.stiffness.asDiagonal());
+  M.block(0, k, k, k) *= w;
+  M.block(k, 0, k, k) = -Eigen::MatrixXd(model.stiffness.asDiagonal()) / w;
   M.block(k, k, k, k) = -model.damping;
   M.block(k, 2 * k, k, k).setIdentity();
+  M.block(k, 2 * k, k, k) *= w;
   const Eigen::MatrixXd E = exponential(M * dt);
-  return {E.topLeftCorner(2 * k, 2 * k), E.topRightCorner(2 * k, k)};
+  out = {E.topLeftCorner(2 * k, 2 * k), E.topRightCorner(2 * k, k) / w};
+  out.Phi.topRightCorner(k, k) /= w;
+  out.Phi.bottomLeftCorner(k, k) *= w;
+  out.Gamma.topRows(k) /= w;
+  return out;
 }
 
 ModalDynamics::ModalDynamics(const ModalModel& model)
@@ -42,6 +53,9 @@ ModalDynamics::ModalDynamics(const ModalModel& model)
   assert(size() <= (coupled_ ? kMaxCoupledModes : kMaxModes));
   assert(model.Phi.cols() == size() && model.damping.rows() == size());
   if (coupled_) damping_ = model.damping;
+  if (size() == 0) return;
+  fastest_ = std::sqrt(k_.maxCoeff());
+  most_damping_ = coupled_ ? damping_.norm() : c_.maxCoeff();
 }
 
 ModalDynamics::Hold ModalDynamics::hold(double dt) const {
@@ -60,13 +74,6 @@ ModalDynamics::Hold ModalDynamics::hold(double dt) const {
   out.Phi = both.Phi;
   out.Gamma = both.Gamma;
   return out;
-}
-
-Mat6 ModalDynamics::ratePerWrench(const Hold& hold) const {
-  const Eigen::MatrixXd Gamma_2 = coupled_
-                                      ? Eigen::MatrixXd(hold.Gamma.bottomRows(size()))
-                                      : Eigen::MatrixXd(hold.modes.row(5).matrix().asDiagonal());
-  return Eigen::MatrixXd(Phi_) * Gamma_2 * Eigen::MatrixXd(Phi_).transpose();
 }
 
 ModalDynamics::Modes ModalDynamics::atRest() const {
@@ -107,27 +114,71 @@ ModalDynamics::Vector<kMaxModes> ModalDynamics::acceleration(const Modes& modes,
   return eta_ddot;
 }
 
-AdmittanceModel::AdmittanceModel(const ModalModel& model, double period, double ahead)
+ModalDynamics ModalDynamics::withoutDampingAbove(double most) const noexcept {
+  ModalDynamics out = *this;
+  if (coupled_ && most_damping_ > most) out.damping_.setZero();
+  for (Eigen::Index i = 0; i < size(); ++i)
+    if (c_(i) > most) out.c_(i) = 0.0;
+  out.most_damping_ = std::min(most_damping_, most);
+  return out;
+}
+
+/// Woodbury: (1 + Phi^T M_1 Phi)^-1 = 1 - Phi^T (1 + M_1 Phi Phi^T)^-1 M_1 Phi.
+ModalDynamics::Body ModalDynamics::body(const Mat6& M_1) const noexcept {
+  const Mat6 left = Mat6::Identity() + M_1 * (Phi_ * Phi_.transpose());
+  const Mat6 X = left.partialPivLu().solve(M_1);
+  Body out;
+  out.pull.noalias() = X * Phi_;
+  return out;
+}
+
+ModalDynamics::Vector<kMaxModes> ModalDynamics::acceleration(const Body& body, const Modes& modes,
+                                                             const Forces& u) const noexcept {
+  Vector<kMaxModes> eta_ddot = acceleration(modes, u);
+  const Vec6 pull = body.pull * eta_ddot;
+  eta_ddot.noalias() -= Phi_.transpose() * pull;
+  return eta_ddot;
+}
+
+ModalDynamics::Modes ModalDynamics::advance(const Body& body, double dt, const Modes& from,
+                                            const Forces& u) const noexcept {
+  // A body only slows the modes down: steps that suffice without it do.
+  constexpr double kMostAngle = 1.5;     // [rad] of the fastest mode in a step
+  constexpr int kMostTerms = 26;         // 1.5^26/26! < 1e-21
+  constexpr double kNegligible = 1e-17;  // [-] of the sum
+  const int steps = std::max(
+      1, static_cast<int>(std::ceil(std::abs(dt) * (fastest_ + most_damping_) / kMostAngle)));
+  const double h = dt / steps;
+  const auto size_of = [this](const Modes& m) {
+    return fastest_ * m.eta.cwiseAbs().sum() + m.eta_dot.cwiseAbs().sum();
+  };
+  const Forces none = Forces::Zero(size());
+  Modes sum = from;
+  for (int n = 0; n < steps; ++n) {
+    // Of {eta, eta'}: its derivative number j times h^j/j!.
+    Modes term = {h * sum.eta_dot, h * acceleration(body, sum, u)};
+    for (int j = 2; j <= kMostTerms; ++j) {
+      sum.eta += term.eta;
+      sum.eta_dot += term.eta_dot;
+      if (!(size_of(term) > kNegligible * size_of(sum))) break;
+      const double factor = h / j;
+      term = {factor * term.eta_dot, factor * acceleration(body, term, none)};
+    }
+  }
+  return sum;
+}
+
+AdmittanceModel::AdmittanceModel(const ModalModel& model, double period)
     : dynamics_(model),
       Phi_pinv_(leastSquares(model.Phi, Mat6::Identity())),
       period_(period),
-      ahead_(ahead),
-      step_(dynamics_.hold(period)),
-      rate_per_wrench_(dynamics_.ratePerWrench(step_)) {
-  if (ahead > 0.0) {
-    constexpr double kMostGrowth = 5.0;  // [-] exponent of a damped mode's way back
-    ahead_hold_ = dynamics_.hold(ahead);
-    back_ = dynamics_.hold(-ahead);
-    const Hold stay = dynamics_.hold(0.0);
-    if (dynamics_.coupled() && !(dynamics_.damping(0) * ahead < kMostGrowth)) back_ = stay;
-    for (Eigen::Index i = 0; !dynamics_.coupled() && i < dynamics_.size(); ++i)
-      if (!(dynamics_.damping(i) * ahead < kMostGrowth)) back_.modes.col(i) = stay.modes.col(i);
-  }
+      step_(dynamics_.hold(period)) {
   now_.modes = dynamics_.atRest();
   before_ = now_;
 }
 
-void AdmittanceModel::reset(const Vec6& x, const Mat6& M_1) noexcept {
+void AdmittanceModel::reset(const Vec6& x, const Mat6& M_1, double ahead) noexcept {
+  constexpr double kMostGrowth = 5.0;  // [-] exponent of a damped mode's way back
   const auto& Phi = dynamics_.Phi();
   Modes& modes = now_.modes;
   modes.eta.noalias() = Phi_pinv_ * x;
@@ -136,48 +187,39 @@ void AdmittanceModel::reset(const Vec6& x, const Mat6& M_1) noexcept {
   offset_.noalias() -= Phi * modes.eta;
   now_.motion = {};
   now_.motion.x = x;
-  if (!(ahead_ > 0.0)) return;
-  // The reaction of M_1 when let go: a = Phi (Phi^T (-M_1 a) - K eta).
-  const Mat6 left = Mat6::Identity() + Phi * Phi.transpose() * M_1;
-  const Vec6 pull = Phi * dynamics_.stiffness().cwiseProduct(modes.eta);
-  const Vec6 a = -left.partialPivLu().solve(pull);
-  const ModalDynamics::Forces u = -(Phi.transpose() * (M_1 * a));
-  modes = dynamics_.advance(back_, modes, u);
+  if (!(ahead > 0.0)) return;
+  const ModalDynamics light = dynamics_.withoutDampingAbove(kMostGrowth / ahead);
+  const ModalDynamics::Forces none = ModalDynamics::Forces::Zero(dynamics_.size());
+  modes = light.advance(light.body(M_1), -ahead, modes, none);
 }
 
-void AdmittanceModel::step(const Wrench& F_Po_I, const Mat6& M_1, double share) noexcept {
-  const auto& Phi = dynamics_.Phi();
+void AdmittanceModel::step(const Wrench& F_Po_I) noexcept {
   before_ = now_;
-  Vec6 F = F_Po_I.stacked();
   ModalDynamics::Forces u;  // Phi^T F
-  if (!M_1.isZero(0.0)) {
-    u.setZero(dynamics_.size());
-    const Modes free = dynamics_.advance(step_, before_.modes, u);
-    Vec6 change = rate_per_wrench_ * F;  // of the base's rate, were there no body
-    change.noalias() += Phi * (free.eta_dot - before_.modes.eta_dot);
-    const Mat6 left = period_ * Mat6::Identity() + rate_per_wrench_ * M_1;
-    const Vec6 a = left.partialPivLu().solve(change);
-    F -= M_1 * a;
-  }
-  u.noalias() = Phi.transpose() * F;
+  u.noalias() = dynamics_.Phi().transpose() * F_Po_I.stacked();
   now_.modes = dynamics_.advance(step_, before_.modes, u);
-  PathPoint<6>& motion = now_.motion;
-  motion = at(now_.modes, u);
-  if (!(share * ahead_ > 0.0)) return;
-  const PathPoint<6> later = at(dynamics_.advance(ahead_hold_, now_.modes, u), u);
-  motion.x += share * (later.x - motion.x);
-  motion.x_dot += share * (later.x_dot - motion.x_dot);
-  motion.x_ddot += share * (later.x_ddot - motion.x_ddot);
+  now_.motion = at(now_.modes, dynamics_.acceleration(now_.modes, u));
 }
 
-PathPoint<6> AdmittanceModel::at(const Modes& modes,
-                                 const ModalDynamics::Forces& u) const noexcept {
+void AdmittanceModel::step(const Wrench& F_Po_I, const Mat6& M_1, double dt,
+                           double ahead) noexcept {
+  const ModalDynamics::Body body = dynamics_.body(M_1);
+  before_ = now_;
+  ModalDynamics::Forces u;
+  u.noalias() = dynamics_.Phi().transpose() * F_Po_I.stacked();
+  now_.modes = dynamics_.advance(body, dt, before_.modes, u);
+  const Modes later = dynamics_.advance(body, ahead, now_.modes, u);
+  now_.motion = at(later, dynamics_.acceleration(body, later, u));
+}
+
+PathPoint<6> AdmittanceModel::at(
+    const Modes& modes, const ModalDynamics::Vector<kMaxModes>& acceleration) const noexcept {
   const auto& Phi = dynamics_.Phi();
   PathPoint<6> out;
   out.x = offset_;
   out.x.noalias() += Phi * modes.eta;
   out.x_dot.noalias() = Phi * modes.eta_dot;
-  out.x_ddot.noalias() = Phi * dynamics_.acceleration(modes, u);
+  out.x_ddot.noalias() = Phi * acceleration;
   return out;
 }
 

@@ -24,10 +24,16 @@ const Measured& LegEstimator::update(const SampleStream& samples, const Elapsed&
     measured_.L = readings_.take(legLengths(codec_, samples.sample().legs), speed_.speed(), waited,
                                  reading_jump_);
   }
-  if (!following)
-    servo_.reset(measured_.L);
-  else if (observes_)
-    observe(elapsed, samples.fresh(), sent.command().counts);
+  const Sample& sample = samples.sample();
+  if (!following) {
+    servo_.reset(measured_.L, sample.time);
+  } else if (observes_ && samples.fresh()) {
+    servo_.arrived(sample.command_tick, sample.command_time);
+    servo_.advance(std::max(sample.legs_time, sample.wrench_time));
+    servo_.correct(measured_.L, sample.legs_time);
+  }
+  if (observes_)
+    felt_ = {measured_.L, servo_.velocity(), servo_.filteredAcceleration(sample.wrench_time)};
 
   const ForwardSolution forward = forwardPose(geometry_, measured_.L, measured_.X_IP);
   measured_.solved = forward.ok();
@@ -36,12 +42,8 @@ const Measured& LegEstimator::update(const SampleStream& samples, const Elapsed&
   return measured_;
 }
 
-/// The servo model, brought to this tick.
-void LegEstimator::observe(const Elapsed& elapsed, bool fresh, const LegCounts& sent) noexcept {
-  constexpr std::int64_t kMost = 10;  // [-] periods; after more it has come to rest
-  const Vec6 reference = legLengths(codec_, sent);
-  for (std::int64_t i = 0; i < std::min(1 + elapsed.missed, kMost); ++i) servo_.advance(reference);
-  if (fresh) servo_.correct(measured_.L);
+void LegEstimator::sent(const LegCounts& counts, std::int64_t tick, std::int64_t time) noexcept {
+  if (observes_) servo_.send(legLengths(codec_, counts), tick, time);
 }
 
 }  // namespace ves

@@ -6,12 +6,13 @@
 
 namespace ves {
 
-void MotionGenerator::begin(const Segment& segment, std::int64_t tick, const Mat6& M_1) noexcept {
+void MotionGenerator::begin(const Segment& segment, std::int64_t tick, const Mat6& M_1,
+                            double age) noexcept {
   segment_ = segment;
   plan_ = planned(segment);
   n_ = 0;
   start_tick_ = tick;
-  if (segment.kind == SegmentKind::kAdmittance) admittance_.begin(motion_.x, M_1);
+  if (segment.kind == SegmentKind::kAdmittance) admittance_.begin(motion_.x, M_1, age);
 }
 
 void MotionGenerator::brake(const Braking& braking) noexcept {
@@ -28,11 +29,10 @@ void MotionGenerator::goHome() noexcept {
   n_ = 0;
 }
 
-PathPoint<6> MotionGenerator::admittanceModel(const Wrench& F_Po_I, const Mat6& M_1, double share,
-                                              const JointVector& q, const Vec6& L,
+PathPoint<6> MotionGenerator::admittanceModel(const AdmittanceInput& in,
                                               const PathChecks& checks) noexcept {
   ++n_;
-  return admittance_.step(F_Po_I, M_1, share, q, motion_.x, L, checks);
+  return admittance_.step(in, motion_.x, checks);
 }
 
 PathPoint<6> MotionGenerator::trajectoryGeneration() noexcept {

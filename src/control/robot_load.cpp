@@ -41,24 +41,28 @@ StaticLoad::StaticLoad(const ControllerConfig& config)
       S_proc_(config.sensor.C_proc.inverse()),
       filters_(config.compensation.inertia),
       filter_(config.servo.sensor_cutoff),
-      filter_step_(filter_.prepare(config.periodSeconds())) {}
+      averages_(config.servo.sensor_window > 0.0) {}
 
 void StaticLoad::update(const Payload& payload, const JointVector& q, const Mat3& R_IP,
-                        bool engaged, double share) noexcept {
+                        double since, bool engaged, double share) noexcept {
   F_So_S_ = staticWrench(payload, q, R_IP, gravity_);
   const Vec6 weight = F_So_S_.stacked();
   counts_ = S_proc_ * weight;
   if (!filters_ || !weight.allFinite()) return;
-  if (engaged)
-    filter_.advance(filter_step_, weight.array());
-  else
+  const Vec6 before = filter_.output().matrix();
+  if (!engaged)
     filter_.settle(weight.array());
-  F_So_S_ = Wrench::from(weight + share * (filter_.output().matrix() - weight));
+  else if (since > 0.0)
+    filter_.advance(filter_.prepare(since), weight.array());
+  Vec6 felt = filter_.output().matrix();
+  if (averages_ && engaged) felt = 0.5 * (before + felt).eval();
+  F_So_S_ = Wrench::from(weight + share * (felt - weight));
 }
 
 RobotInertia::RobotInertia(const ControllerConfig& config)
     : compensated_(config.compensation.inertia),
       mass_update_(config.compensation.mass_update),
+      scale_(config.servo.sensor_scale),
       geometry_(config.geometry) {}
 
 Wrench RobotInertia::update(const KnownPayload& known, std::int64_t count, const JointVector& q,
@@ -67,7 +71,7 @@ Wrench RobotInertia::update(const KnownPayload& known, std::int64_t count, const
   if (!compensated_ || !engaged) return {};
   if (count % mass_update_ == 0 || known.changed())
     composite_P_ = combine(RigidBody{}, known.payload().X_PL0(), compositeBody(known.carried(), q));
-  M_1_ = share * spatialMass(rotated(X_IP.R, composite_P_));
+  M_1_ = share * scale_ * spatialMass(rotated(X_IP.R, composite_P_));
   BodyMotion P;
   if (!forwardMotion(geometry_, X_IP, legs, P)) return {};
   Vec6 acceleration;

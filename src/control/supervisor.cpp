@@ -234,7 +234,7 @@ void Supervisor::beginProgram(int at, const Situation& now, Actuation act) noexc
 
 void Supervisor::begin(const Segment& segment, const Situation& now, Actuation act) noexcept {
   phase_ = Phase::kRunning;
-  act.motion.begin(segment, now.tick, now.M_1);
+  act.motion.begin(segment, now.tick, now.M_1, now.age);
   if (segment.kind == SegmentKind::kCalibration) act.bias.beginCalibration();
 }
 

@@ -21,6 +21,7 @@ std::string_view name(Phase phase) noexcept {
 TestPlatform::TestPlatform(const ControllerConfig& config)
     : config_(config),
       period_(config.periodSeconds()),
+      samples_(config.period),
       share_(config.compensation, period_),
       legs_(config),
       known_(config),
@@ -35,26 +36,33 @@ const TickState& TestPlatform::tick(const TickInput& in) noexcept {
   const bool engaged = commander_.command().engaged;
   const bool following = engaged && !supervisor_.stopped();
   const Elapsed& elapsed = clock_.update(in.tick);
-  samples_.update(in.sample, engaged, in.conflicting_node);
+  samples_.update(in.sample, in.time, engaged, in.conflicting_node);
   if (following) share_.advance();
   const Sample& sample = samples_.sample();
   const Transform& X_IP = legs_.update(samples_, elapsed, following, commander_).X_IP;  // (2.23)
 
   known_.update(elapsed, commander_.command().segment);
-  load_.update(known_.payload(), sample.q, X_IP.R, engaged, share_.value());
+  load_.update(known_.payload(), sample.q, X_IP.R, samples_.wrench().since, engaged,
+               share_.value());
   bias_.stepTare(sample, samples_.fresh(), load_.counts());
   // The measured attitude: the commanded one leads it by the servo's lag, and the difference would
   // pass as a wrench of the robot's weight.
   Wrenches W;
   W.total = forceMeasurement(config_.sensor, bias_.counts(), sample.adc, X_IP.R);  // (C.1)
   W.static_wrench = gravityCompensation(config_.payload, X_IP.R, load_.wrench());  // (B.4)
-  W.inertial = robot_.update(known_, elapsed.count, sample.q, X_IP, legs_.filteredMotion(), engaged,
+  W.inertial = robot_.update(known_, elapsed.count, sample.q, X_IP, legs_.feltMotion(), engaged,
                              share_.value());
   W.dynamic = W.total - W.static_wrench + W.inertial;
   safety_.watch(elapsed, samples_, load_.counts());
 
-  const Situation now{config_,      safety_.path(),     in.tick, samples_.freshTicks(), W.dynamic,
-                      robot_.M_1(), commander_.legs().L};
+  const Situation now{config_,
+                      safety_.path(),
+                      in.tick,
+                      samples_.freshTicks(),
+                      W.dynamic,
+                      robot_.M_1(),
+                      samples_.wrench().age,
+                      commander_.legs().L};
   const Actuation act{motion_, bias_, samples_, share_};
   supervisor_.handle(in.order, now, act);
   supervisor_.advance(now, act);
@@ -68,6 +76,7 @@ const TickState& TestPlatform::tick(const TickInput& in) noexcept {
     hold();
   else
     legCommunication(next);  // (C.13)
+  legs_.sent(commander_.command().counts, in.tick, in.time);
   return report(W);
 }
 
@@ -78,8 +87,9 @@ PathPoint<6> TestPlatform::nextMotion(const Wrench& dynamic) noexcept {
   if (supervisor_.runs(motion_, SegmentKind::kCalibration))
     bias_.calibrate(sample, samples_.fresh(), load_.counts());
   if (supervisor_.runs(motion_, SegmentKind::kAdmittance))
-    return motion_.admittanceModel(dynamic, robot_.M_1(), share_.value(), sample.q,
-                                   commander_.legs().L, safety_.path());
+    return motion_.admittanceModel(
+        {dynamic, robot_.M_1(), share_.value(), samples_.wrench(), sample.q, commander_.legs().L},
+        safety_.path());
   if (supervisor_.moves()) return motion_.trajectoryGeneration();
   // Until the legs follow, they are where they are measured.
   const bool at_measured = supervisor_.disarmed() ||
@@ -103,7 +113,7 @@ Tripped TestPlatform::safetyChecks(const Proposal& next, const Wrench& dynamic,
 void TestPlatform::legCommunication(const Proposal& next) noexcept {
   motion_.commit(next.x, lead() > 0.0);
   commander_.command(next.legs, !supervisor_.disarmed(), supervisor_.segment(), lead(),
-                     share_.value(), legs_.servo());
+                     share_.value(), legs_.servo(), samples_.wrench().age);
 }
 
 /// [s] after this tick for which a command is meant: the admittance model determines the next

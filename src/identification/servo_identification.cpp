@@ -16,11 +16,14 @@ constexpr std::array<Vec6 ServoModel::*, 4> kParameters = {
 /// Lengths that the model foretells, the first reading given.
 std::vector<Vec6> foretold(const ServoModel& servo, double period, double phase,
                            const LegRecord& record) {
+  const std::int64_t tick = std::llround(period * 1e9);  // [ns]
   ServoObserver model(servo, period, phase);
-  model.reset(record.length.front());
+  model.reset(record.length.front(), 0);
   std::vector<Vec6> out = {record.length.front()};
   for (std::size_t n = 0; n + 1 < record.length.size(); ++n) {
-    model.advance(record.reference[n]);
+    const auto now = static_cast<std::int64_t>(n);
+    model.send(record.reference[n], now, now * tick);
+    model.advance((now + 1) * tick);
     out.push_back(model.length());
   }
   return out;
@@ -36,6 +39,7 @@ ServoEstimate fit(const ServoModel& nominal, double period, double phase, const 
   ServoEstimate out;
   out.servo = nominal;
   out.deviation = nominal;
+  out.deviation.sensor_delay = out.deviation.sensor_scale = 0.0;  // not looked at
   for (int turn = 0; turn <= kTurns; ++turn) {
     const std::vector<Vec6> now = foretold(out.servo, period, phase, record);
     std::array<std::vector<Vec6>, 4> changed;

@@ -29,6 +29,11 @@ Eigen::VectorXd symmetricEigenvalues(const MatrixXd& A) {
   return Eigen::SelfAdjointEigenSolver<MatrixXd>(A, Eigen::EigenvaluesOnly).eigenvalues();
 }
 
+SymmetricEigen symmetricEigen(const MatrixXd& A) {
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(A);
+  return {solver.eigenvalues(), solver.eigenvectors()};
+}
+
 MatrixXd exponential(const MatrixXd& A) { return A.exp(); }
 
 MatrixXd leastSquares(const MatrixXd& A, const MatrixXd& B) {

@@ -47,6 +47,13 @@ Plant::Plant(const PlantConfig& config)
   filter_velocity_.settle(Vec6::Zero().array());
   filter_acceleration_.settle(Vec6::Zero().array());
   sensor_.settle(sensorLoad());
+  if (config.sensor_readings > 1) {
+    sensor_interval_ = config.sensor_window / config.sensor_readings;
+    next_sensor_ = sensor_interval_ / 2;
+    const double warmer = config_.climate.at(0.0) - config_.climate.mean;
+    sensor_readings_.assign(static_cast<std::size_t>(config.sensor_readings) + 1,
+                            sensor_.convert(warmer));
+  }
 }
 
 void Plant::command(const LegCommand& command) noexcept {
@@ -111,6 +118,7 @@ void Plant::skip(std::int64_t until) noexcept {
   if (heard_ != kNever) heard_ += time;  // who asks for such a leap would have gone on commanding
   next_reading_ += time;
   if (next_step_ != kNever) next_step_ += time;
+  if (next_sensor_ != kNever) next_sensor_ += time;
 }
 
 void Plant::advance(std::int64_t until) noexcept {
@@ -121,13 +129,18 @@ void Plant::advance(std::int64_t until) noexcept {
 
 void Plant::runEvents(std::int64_t until) noexcept {
   for (;;) {
-    const std::int64_t next = std::min({next_reading_, next_step_, next_robot_event_});
+    const std::int64_t next =
+        std::min({next_reading_, next_step_, next_sensor_, next_robot_event_});
     if (next > until) break;
     moveActuators(next);
     if (next == next_robot_event_) startRobotEvents();
     if (next == next_step_) {
       stepMechanics();
       next_step_ = kNever;
+    }
+    if (next == next_sensor_) {
+      readSensor();
+      next_sensor_ += sensor_interval_;
     }
     if (next == next_reading_) {
       readTransducers();
@@ -245,6 +258,27 @@ void Plant::stepMechanics() noexcept {
   truth_.F_Po_I = rotate(truth_.P.X.R, transfer(config_.payload.X_PS, F_So_S));
 }
 
+void Plant::readSensor() noexcept {
+  stepMechanics();
+  const double warmer = config_.climate.at(seconds(now_)) - config_.climate.mean;
+  sensor_readings_[read_++ % sensor_readings_.size()] = sensor_.convert(warmer);
+}
+
+/// The newest window that is over: each reading is the middle of its part of it.
+void Plant::averageSensor(Sample& s) const noexcept {
+  const std::int64_t newest = next_sensor_ - sensor_interval_;
+  const std::size_t skipped = newest + sensor_interval_ / 2 > now_ ? 1 : 0;
+  s.wrench_time = std::max<std::int64_t>(
+      0, newest + sensor_interval_ / 2 - static_cast<std::int64_t>(skipped) * sensor_interval_);
+  const std::size_t size = sensor_readings_.size();
+  for (std::size_t i = 0; i < kWrenchChannels; ++i) {
+    double sum = 0.0;
+    for (std::size_t k = 1 + skipped; k < size + skipped; ++k)
+      sum += sensor_readings_[(read_ + size - k) % size][i];
+    s.adc[i] = static_cast<std::int32_t>(std::lround(sum / static_cast<double>(size - 1)));
+  }
+}
+
 Sample Plant::sample() noexcept {
   stepMechanics();
   truth_.time = now_;
@@ -255,6 +289,7 @@ Sample Plant::sample() noexcept {
   s.temperature = config_.climate.at(seconds(now_));
   const double warmer = s.temperature - config_.climate.mean;
   s.adc = sensor_.convert(warmer);
+  if (!sensor_readings_.empty()) averageSensor(s);
   truth_.F_So_S = sensor_.reading(warmer);
   for (std::size_t i = 0; i < kLegs; ++i) {
     s.legs[i] = config_.transducer.count(actuators_[i].length());

@@ -47,9 +47,12 @@ Motion commanded(const Series& series) {
 
 Motion actual(const Series& series) {
   Motion out;
-  eachTick(series, [&](const Row& row, double t) {
+  std::optional<double> start;  // [ns] by the machine's clock, as the truth's time
+  eachTick(series, [&](const Row& row, double) {
+    if (!start) start = static_cast<double>(row.state.machine_time_ns);
     if (!row.hasTruePose()) return;
-    out.t.push_back(t);
+    out.t.push_back((static_cast<double>(row.truth.header.time_ns) - *start) *
+                    kSecondPerNanosecond);
     out.x.push_back(Vec6::Map(row.truth.x));
   });
   return out;
@@ -135,18 +138,44 @@ Motion motion(const std::vector<InteractionPoint>& points) {
   return out;
 }
 
+namespace {
+
+/// x at time t: by a line between two points, by cubic Hermite polynomials where rates are known.
+std::optional<Vec6> at(const Motion& motion, double t) {
+  constexpr double kSame = 1e-9;  // [s]
+  const auto after = std::lower_bound(motion.t.begin(), motion.t.end(), t - kSame);
+  if (after == motion.t.end()) return {};
+  const auto i = static_cast<std::size_t>(after - motion.t.begin());
+  if (*after - t <= kSame) return motion.x[i];
+  if (i == 0) return {};
+  const double h = *after - motion.t[i - 1], s = (t - motion.t[i - 1]) / h;
+  const Vec6 line = (1.0 - s) * motion.x[i - 1] + s * motion.x[i];
+  if (motion.x_dot.empty()) return line;
+  const Vec6 rise = motion.x[i] - motion.x[i - 1];
+  return line +
+         s * (1.0 - s) *
+             ((1.0 - s) * (h * motion.x_dot[i - 1] - rise) - s * (h * motion.x_dot[i] - rise));
+}
+
+}  // namespace
+
 Distance distance(const Motion& a, const Motion& b) {
   Distance d;
-  const std::size_t n = std::min(a.x.size(), b.x.size());
-  for (std::size_t i = 0; i < n; ++i) {
-    const double p = (a.x[i] - b.x[i]).head<3>().norm(), r = (a.x[i] - b.x[i]).tail<3>().norm();
-    d.rms_position += p * p / static_cast<double>(n);
-    d.rms_attitude += r * r / static_cast<double>(n);
+  double n = 0.0;
+  for (std::size_t i = 0; i < a.x.size(); ++i) {
+    const std::optional<Vec6> there = at(b, a.t[i]);
+    if (!there) continue;
+    const Vec6 apart = a.x[i] - *there;
+    const double p = apart.head<3>().norm(), r = apart.tail<3>().norm();
+    ++n;
+    d.rms_position += p * p;
+    d.rms_attitude += r * r;
     d.peak_position = std::max(d.peak_position, p);
     d.peak_attitude = std::max(d.peak_attitude, r);
   }
-  d.rms_position = std::sqrt(d.rms_position);
-  d.rms_attitude = std::sqrt(d.rms_attitude);
+  if (n == 0.0) return d;
+  d.rms_position = std::sqrt(d.rms_position / n);
+  d.rms_attitude = std::sqrt(d.rms_attitude / n);
   return d;
 }
 

@@ -99,6 +99,7 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
     // is repeated; the answer to a repeated one is the same sample again.
     LegCommand none;
     leg_command_t out = toMessage(none, header(self, -1, 0));
+    std::int64_t first = 0;  // [ns] the machine's clock at tick 0
     for (;;) {
       for (int i = 0; link.answers() != in.tick - 1; ++i) {
         if (i == kAnswerTries)
@@ -109,6 +110,8 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
         if (wantsOut()) return letGo();
       }
       in.sample = link.sample();
+      if (in.tick == 0) first = in.sample.time;
+      in.time = first + in.tick * experiment.controller.period;
       const TickState& state = platform.tick(in);
       const header_t h = header(self, in.tick, in.sample.time);
       const state_t told = toMessage(state, in, h);
@@ -164,6 +167,8 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
     in.sample = link.sample();
     const std::int64_t sample_time = link.sampleTime();
     in.conflicting_node = link.takeConflict() || in.conflicting_node;
+    // Where the clocks are not known to each other, a sample counts as taken just now.
+    in.time = link.clock().known() ? woke + link.clock().offset(woke) : in.sample.time;
     const std::int64_t received = monotonicNow();
 
     const TickState& state = platform.tick(in);

@@ -120,7 +120,10 @@ void MachineProcess::inRealTime(const std::function<bool()>& stop) {
     const std::int64_t now = monotonicNow();
     link_.setTime(now);
     moveRobot(false);
-    if (const auto command = link_.takeCommand()) machine_.command(command->first);
+    if (const auto command = link_.takeCommand()) {
+      plant().advance(link_.lastHeard().time - start);
+      machine_.command(command->first);
+    }
     machine_.advance(now - start, now);
     if (machine_.waitsFor().empty()) {
       publish(-1);

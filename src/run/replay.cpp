@@ -140,6 +140,11 @@ class Replayer {
                              recorded.header.sequence));
     TickInput in;
     in.tick = recorded.header.sequence;
+    constexpr std::int64_t kMaxTime = INT64_MAX / 8;  // [ns]
+    in.time = recorded.machine_time_ns;
+    if (in.time < 0 || in.time > kMaxTime)
+      fail(fmt::format("tick {} has a machine_time_ns of {}, want 0 to {}", in.tick, in.time,
+                       kMaxTime));
     in.order = orderOf(recorded);
     in.conflicting_node = recorded.conflicting_node != 0;
     if (recorded.sample_sequence >= 0) {

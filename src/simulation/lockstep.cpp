@@ -17,6 +17,7 @@ bool plausible(const Sample& s) noexcept {
   good = good && s.time <= kMaxTime;
   for (const std::int64_t t : {s.legs_time, s.wrench_time, s.joints_time})
     good = good && t >= 0 && t <= s.time;
+  good = good && s.command_time >= 0 && s.command_time <= kMaxTime;
   good = good && s.faults <= kAllPieces;
   return good && s.temperature >= kColdest && s.temperature <= kHottest;
 }
@@ -25,6 +26,7 @@ const TickState& Lockstep::tick() noexcept {
   sample_ = plant_.sample();
   if (disturb) disturb(sample_);
   if (!gate || plausible(sample_)) input.sample = sample_;
+  input.time = input.tick * period_;
   state_ = &platform_.tick(input);
   return *state_;
 }

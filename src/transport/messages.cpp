@@ -91,6 +91,7 @@ state_t toMessage(const TickState& state, const TickInput& in, const header_t& h
   state_t m;
   m.header = header;
   m.count = state.count;
+  m.machine_time_ns = in.time;
   m.sample_sequence = state.sample_sequence;
   m.request = static_cast<std::int32_t>(in.order.request);
   m.order_source = state.order.source;
@@ -289,6 +290,10 @@ std::optional<Sample> fromMessage(const sample_t& m) noexcept {
   s.wrench_time = stamp(m.wrench_time_ns);
   s.joints_time = stamp(m.joints_time_ns);
   s.faults = static_cast<std::uint32_t>(m.faults);
+  if (m.command_source != 0) {
+    s.command_tick = m.command_sequence;
+    s.command_time = m.command_time_ns;
+  }
   if (!plausible(s)) return {};
   return s;
 }

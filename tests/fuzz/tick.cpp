@@ -2,6 +2,7 @@
 //
 // The whole tick, driven by arbitrary samples and orders: whatever comes in, every command that
 // leaves lies inside the limits and near the one before.
+#include <algorithm>
 #include <cstdio>
 
 #include "bytes.hpp"
@@ -30,13 +31,22 @@ Segment segment(fuzz::Bytes& in) {
   return s;
 }
 
+Experiment experiment(std::vector<std::string> set) {
+  set.insert(set.end(),
+             {"controller.stability=forced", "controller.stability_uncompensated=forced"});
+  return loadExperiment(VES_TEST_CONFIG_DIR "/scenarios/puma_on_table_4_1.yaml", set);
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static const Experiment e =
-      loadExperiment(VES_TEST_CONFIG_DIR "/scenarios/puma_on_table_4_1.yaml",
-                     {"controller.stability=forced", "controller.stability_uncompensated=forced"});
-  static const double count = e.plant.transducer.scale;
+  static const Experiment published = experiment({}),
+                          compensated = experiment({"controller.compensation.feed_forward=true",
+                                                    "controller.compensation.observer=true",
+                                                    "controller.compensation.inertia=true",
+                                                    "sensor.readings_per_tick=4"});
+  const Experiment& e = size % 2 == 0 ? published : compensated;
+  const double count = e.plant.transducer.scale;
   const SafetyLimits& limits = e.controller.safety;
   fuzz::Bytes in(data, size);
   TestPlatform platform(e.controller);
@@ -70,12 +80,17 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     was_engaged = state.command.engaged;
     s.sequence += 1;
     s.adc[0] ^= 1;
+    input.time += e.controller.period;
+    s.time = input.time;
+    s.legs_time = s.wrench_time = s.joints_time = s.time;
   };
 
   // Armed first: a fuzzer seldom sends ten good samples in a row.
   for (int i = 0; i < 14; ++i) tick();
   input.order.request = Request::kArm;
   tick();
+  tick();
+  fuzz::require(was_engaged);
   while (!in.empty()) {
     const std::uint8_t what = in.take<std::uint8_t>();
     switch (what % 16) {
@@ -98,6 +113,13 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         s.switches = kAllSwitchesClosed;
         s.q = e.plant.initial_joints;
         s.adc[6] = (limits.pressure_min + limits.pressure_max) / 2;
+        break;
+      case 13: s.wrench_time += 1000 * in.take<std::int16_t>(); break;
+      case 14:
+        // As far off as the gate lets them be.
+        s.legs_time = std::clamp<std::int64_t>(in.take<std::int64_t>(), 0, s.time);
+        s.command_tick = input.tick - what / 16;
+        s.command_time = std::clamp<std::int64_t>(in.take<std::int64_t>(), 0, INT64_MAX / 8);
         break;
       default:
         for (int i = 0; i < what / 4; ++i) tick();

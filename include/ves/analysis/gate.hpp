@@ -3,6 +3,7 @@
 // The gate: whether admittance control may begin with this base, robot and machine.
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -11,9 +12,13 @@
 namespace ves {
 
 /// The loop of an experiment at its worst: the gain of either direction, the robot in each of
-/// programRobots().
+/// programRobots(). With the inertia compensated it has to decay also where the belief is off by
+/// what it may be: the wrench's time, the servos' gain and the robot's mass, each up or down.
 struct LoopVerdict {
   bool stable = true;
+  bool as_believed = true;   // it would be, were the belief exact
+  Uncertainty uncertainty;   // that it is judged for,
+  std::array<int, 3> off{};  // [-] and where not: timing, gain and mass, -1 or 1
   DominantRoot worst;
   Direction direction = Direction::kExtending;
   Loop extending, retracting;  // in the pose where each is worst

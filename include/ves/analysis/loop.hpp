@@ -5,7 +5,7 @@
 //
 //   eta --Phi--> command, held --LegSlave, valve, cylinder--> platform --M_1--> wrench
 //    ^                                                                            |
-//    +--- admittance model <--- delay, in ticks <--- sample <--- sensor filter <--+
+//    +--- admittance model <--- delay, in ticks <--- sample, or mean <--- sensor filter <--+
 //
 // What the controller adds beyond the report (control/servo.hpp) is in it: the servo model and the
 // robot as it believes them, which need not be what they are.
@@ -35,13 +35,16 @@ struct Loop {
   double tau = 0.0;              // [s] of the actuator
   double filter_cutoff = 0.0;    // [rad/s] of Filter 3; 0: none
   double sensor_cutoff = 0.0;    // [rad/s]
-  int delay = 0;                 // [ticks] that a sample is older than it need be
+  int readings = 1;              // [-] of the A/D converter, averaged over a period
+  double late = 0.0;             // [s] by which a wrench is later than anybody knows
+  int delay = 0;                 // [ticks] that a sample is older than it need be, and says so
   /// Of the compensation, when it is on.
   struct Model {
     bool feed_forward = false, inertia = false;
     RigidBody robot_P;
     ServoModel servo;  // all legs alike, one gain for both directions, no rail
 
+    Mat6 M_1() const { return servo.sensor_scale * spatialMass(robot_P); }
     double gain() const { return servo.extend(0); }  // [1/s]
     void setGain(double gain) {
       servo.extend.setConstant(gain);
@@ -49,6 +52,16 @@ struct Loop {
     }
   } model;
 };
+
+/// What a belief may be wrong by, either way.
+struct Uncertainty {
+  double timing = 0.0;  // [s] of the wrench
+  double gain = 0.0;    // [-] of the servos
+  double mass = 0.0;    // [-] of the robot
+};
+
+/// The loop of a machine that is off in timing and gain, in directions of -1, 0 or 1.
+Loop off(Loop loop, const Uncertainty& by, int timing, int gain);
 
 /// The gain of a leg depends on which way it moves. A leg that swings has the harmonic mean, as
 /// long as its speed is nearly a sine.
@@ -90,12 +103,16 @@ bool decays(const Loop& loop);
 /// The same, carrying each of these robots in turn; most of the work is done once for all of them.
 bool decaysWithAll(const Loop& loop, const std::vector<CarriedRobot>& robots);
 
-/// Factor on the robot's inertia that the loop bears, the controller's belief unchanged, and ticks
-/// of further delay; from a stable loop.
+/// What a stable loop bears, the controller's belief unchanged: a factor on the robot's inertia,
+/// one on the servos' gain, a wrench that is earlier or later than believed, and ticks of further
+/// delay.
 struct Margins {
-  double gain = 0.0;  // [-] kMostGain: at least
-  int delay = 0;      // [ticks] kMostDelay: at least
+  double gain = 0.0;               // [-] kMostGain: at least
+  double servo_gain = 0.0;         // [-] the same
+  double early = 0.0, late = 0.0;  // [s] kMostTime: at least
+  int delay = 0;                   // [ticks] kMostDelay: at least
   static constexpr double kMostGain = 64.0;
+  static constexpr double kMostTime = 0.005;
   static constexpr int kMostDelay = 50;
 };
 Margins margins(const Loop& loop);
@@ -104,6 +121,10 @@ Margins margins(const Loop& loop);
 /// decays with the gain of either direction, the robot at q. 0 when even one diverges.
 int stableModes(const ControllerConfig& controller, const plant::PlantConfig& plant,
                 const JointVector& q);
+
+/// The base with a rigid body M_1 on it, which is a modal model again: the left-hand side of
+/// (3.11).
+ModalModel withBody(const ModalModel& base, const Mat6& M_1);
 
 /// The softest k modes of a base.
 ModalModel softest(const ModalModel& base, int k);

@@ -7,13 +7,13 @@
 #include <string>
 
 #include "ves/config/document.hpp"
-#include "ves/control/servo.hpp"
+#include "ves/control/controller_config.hpp"
 
 namespace ves {
 
 struct ServoRecord {
   std::int64_t date = 0;  // [s] since 1970, UTC
-  ServoModel servo;       // extend, retract, tau, delay
+  ServoModel servo;       // extend, retract, tau, delay; of the sensor, delay and scale
   ServoModel deviation;   // standard, of the same
 };
 
@@ -25,5 +25,7 @@ ServoRecord readServo(Section section);
 
 /// `nominal` with what the record has found.
 ServoModel withRecord(ServoModel nominal, const ServoRecord& record);
+/// What the belief may be wrong by: three of the record's deviations, where it has them.
+Compensation withRecord(Compensation nominal, const ServoRecord& record);
 
 }  // namespace ves

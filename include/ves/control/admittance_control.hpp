@@ -6,21 +6,33 @@
 #include "ves/control/controller_config.hpp"
 #include "ves/control/monitors.hpp"
 #include "ves/control/path_checks.hpp"
+#include "ves/control/tick_clock.hpp"
 
 namespace ves {
+
+/// What a step of admittance control is made of.
+struct AdmittanceInput {
+  const Wrench& F_Po_I;
+  const Mat6& M_1;             // of the composite body that is compensated
+  double share;                // [-] of the compensation
+  const WrenchTiming& wrench;  // when F_Po_I was read
+  const JointVector& q;        // of the robot
+  const Vec6& L;               // [m] lengths last commanded
+};
 
 class AdmittanceControl {
  public:
   explicit AdmittanceControl(const ControllerConfig& config);
 
-  /// At rest at x; M_1 is the composite body that is compensated.
-  void begin(const Vec6& x, const Mat6& M_1) noexcept;
+  /// At rest at x; M_1 is the composite body that is compensated, `age` [s] that of the wrench.
+  void begin(const Vec6& x, const Mat6& M_1, double age) noexcept;
 
-  /// The coordinates one period on, under F_Po_I. `last` was commanded in the tick before, with the
-  /// lengths `L` [m]; q are the robot's joints. A wrench that is not finite leaves the model as it
-  /// is: the finite check stops the run.
-  const PathPoint<6>& step(const Wrench& F_Po_I, const Mat6& M_1, double share,
-                           const JointVector& q, const Vec6& last, const Vec6& L,
+  /// The coordinates one period on. `last` was commanded in the tick before. A wrench that is not
+  /// finite leaves the model as it is: the finite check stops the run.
+  ///
+  /// With the inertia compensated the model goes from wrench to wrench, by their own times, and the
+  /// command is what it foretells for the end of the period.
+  const PathPoint<6>& step(const AdmittanceInput& in, const Vec6& last,
                            const PathChecks& checks) noexcept;
 
   /// The energy is watched from now on only.
@@ -33,6 +45,8 @@ class AdmittanceControl {
   void slowInsideEnvelope(const Vec6& last, const Vec6& L, const PathChecks& checks) noexcept;
 
   AdmittanceModel model_;
+  bool inertia_;         // compensated
+  double wrench_delay_;  // [s]
   Oscillation oscillation_;
   double period_;        // [s]
   double joint_moves_;   // [rad | m] what counts as a motion of the robot

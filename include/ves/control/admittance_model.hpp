@@ -63,10 +63,22 @@ class ModalDynamics {
   Modes advance(const Hold& hold, const Modes& from, const Forces& u) const noexcept;
   /// (C.7): eta'' under u.
   Vector<kMaxModes> acceleration(const Modes& modes, const Forces& u) const noexcept;
-  /// Phi Gamma_2 Phi^T: the base's rate after the hold, per wrench.
-  Mat6 ratePerWrench(const Hold& hold) const;
-  /// The largest damping that concerns mode i [1/s]; the whole matrix's when it couples.
-  double damping(Eigen::Index i) const { return coupled_ ? damping_.norm() : c_(i); }
+
+  /// A rigid body M_1 on the base: (1 + Phi^T M_1 Phi) eta'' + damping eta' + diag(stiffness) eta =
+  /// u, the left-hand side of (3.11).
+  struct Body {
+    Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, kMaxModes> pull;  // wrench per -eta''(free)
+  };
+  Body body(const Mat6& M_1) const noexcept;
+  /// From `from` over dt [s], which may be negative, with the body, `u` held. To rounding: the
+  /// exponential's Taylor series, in as many steps as the fastest mode takes.
+  Modes advance(const Body& body, double dt, const Modes& from, const Forces& u) const noexcept;
+  Vector<kMaxModes> acceleration(const Body& body, const Modes& modes,
+                                 const Forces& u) const noexcept;
+
+  /// The same without the damping of modes that have more than `most` [1/s]; all of it where
+  /// damping couples them and is more than that.
+  ModalDynamics withoutDampingAbove(double most) const noexcept;
 
   Modes atRest() const;
   /// [J] the modes are mass-normalised.
@@ -78,8 +90,9 @@ class ModalDynamics {
 
  private:
   Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, kMaxModes> Phi_;
-  Vector<kMaxModes> k_;  // [1/s^2]
-  Vector<kMaxModes> c_;  // [1/s] diagonal of the damping
+  Vector<kMaxModes> k_;                        // [1/s^2]
+  Vector<kMaxModes> c_;                        // [1/s] diagonal of the damping
+  double fastest_ = 0.0, most_damping_ = 0.0;  // [rad/s], [1/s]
   bool coupled_ = false;
   Square damping_;  // when coupled
 };
@@ -88,24 +101,21 @@ class ModalDynamics {
 /// taken as small: the wrench's moments drive the fixed angles directly, as in (C.2).
 class AdmittanceModel {
  public:
-  /// Discretises for the period [s]. `ahead` [s]: motion() is so much later than the step's end,
-  /// the wrench held.
-  AdmittanceModel(const ModalModel& model, double period, double ahead = 0.0);
+  /// Discretises for the period [s].
+  AdmittanceModel(const ModalModel& model, double period);
 
-  /// At rest at x. What the modes cannot express of x stays as a constant offset. With `ahead` it
-  /// is motion() that will have started from rest there: the modes start so much earlier, on the
-  /// motion with M_1 that leads to x; heavily damped ones excepted.
-  void reset(const Vec6& x, const Mat6& M_1 = Mat6::Zero()) noexcept;
+  /// At rest at x. What the modes cannot express of x stays as a constant offset. It is motion(),
+  /// `ahead` [s] of the modes, that will have started from rest there: they start so much earlier,
+  /// on the motion with M_1 that leads to x, heavy damping left out of it.
+  void reset(const Vec6& x, const Mat6& M_1 = Mat6::Zero(), double ahead = 0.0) noexcept;
 
   /// (C.6): the state one period after W began to act.
-  void step(const Wrench& F_Po_I) noexcept { step(F_Po_I, Mat6::Zero(), 0.0); }
+  void step(const Wrench& F_Po_I) noexcept;
 
-  /// The same with a rigid body M_1 on the base [M_1] [a; alpha], whose inertia is not in F_Po_I:
-  /// the left-hand side of (3.11). Its reaction is held over the step, that of the base's mean
-  /// acceleration a over the step, which both determine:
-  ///   a T = Phi (eta'(free) - eta') + Phi Gamma_2 Phi^T (F - M_1 a),
-  /// six equations whatever the number of modes. `share` [-] of `ahead` counts.
-  void step(const Wrench& F_Po_I, const Mat6& M_1, double share) noexcept;
+  /// The same `dt` [s] after, with a rigid body M_1 on the base whose inertia is not in F_Po_I:
+  /// the left-hand side of (3.11). motion() is `ahead` [s] of that, F_Po_I held. dt of 0: F_Po_I
+  /// has acted already.
+  void step(const Wrench& F_Po_I, const Mat6& M_1, double dt, double ahead) noexcept;
 
   /// Takes back all but `share` of the last step, and of the rate it led to: all modes alike, so
   /// the path stays and only the motion along it is slowed.
@@ -115,7 +125,7 @@ class AdmittanceModel {
   double kineticEnergy() const noexcept { return 0.5 * now_.modes.eta_dot.squaredNorm(); }
   double energy() const noexcept { return kineticEnergy() + dynamics_.potentialEnergy(now_.modes); }
 
-  /// (C.7): position, velocity, acceleration at the last step's end.
+  /// (C.7): position, velocity, acceleration at the last step's end, or ahead of it.
   const PathPoint<6>& motion() const noexcept { return now_.motion; }
 
   int modes() const noexcept { return static_cast<int>(dynamics_.size()); }
@@ -125,18 +135,16 @@ class AdmittanceModel {
   using Hold = ModalDynamics::Hold;
   struct State {
     Modes modes;
-    PathPoint<6> motion;  // with the share of `ahead`
+    PathPoint<6> motion;
   };
 
-  /// (C.7).
-  PathPoint<6> at(const Modes& modes, const ModalDynamics::Forces& u) const noexcept;
+  PathPoint<6> at(const Modes& modes,
+                  const ModalDynamics::Vector<kMaxModes>& acceleration) const noexcept;
 
   ModalDynamics dynamics_;
   Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::RowMajor, kMaxModes, 6> Phi_pinv_;
   double period_ = 0.0;  // [s]
-  double ahead_ = 0.0;   // [s]
-  Hold step_, ahead_hold_, back_;
-  Mat6 rate_per_wrench_;
+  Hold step_;
   State now_, before_;  // before the last step
   Vec6 offset_ = Vec6::Zero();
 };

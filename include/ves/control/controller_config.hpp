@@ -21,6 +21,10 @@ struct Compensation {
   int mass_update = 1;        // [-] ticks for which the robot's composite body is kept
   double ramp = 0.5;          // [s] over which they come in, and go out
   double jitter = 0.0;        // [s] by which the time of a leg's reading may be wrong
+  // What the belief may be wrong by, for which the loop has to decay (analysis/gate.hpp).
+  double timing_error = 0.0;  // [s] of the wrench
+  double gain_error = 0.0;    // [-] of the servos
+  double mass_error = 0.0;    // [-] of the robot
 
   bool any() const noexcept { return feed_forward || observer; }
 };

@@ -38,10 +38,10 @@ class LegCommander {
   explicit LegCommander(const ControllerConfig& config);
 
   /// (C.13): counts of `legs`, which are meant `lead` [s] after this tick. `share` [-] of the
-  /// compensation takes out the servos' lag and, by the model `servo`, the counts. A length that is
-  /// not finite leaves the counts as they are.
+  /// compensation takes out the servos' lag and, by the model `servo`, which is `age` [s] behind
+  /// this tick, the counts. A length that is not finite leaves the counts as they are.
   void command(const LegMotion& legs, bool engaged, std::int32_t segment, double lead, double share,
-               const ServoObserver& servo) noexcept;
+               const ServoObserver& servo, double age) noexcept;
   /// The last lengths are held.
   void hold() noexcept;
   /// Whether the legs may go home should no further command come.
@@ -56,8 +56,8 @@ class LegCommander {
   const Vec6& reference() const noexcept { return reference_; }  // [m] what the servos were told
 
  private:
-  Vec6 referenceOf(const LegMotion& legs, double lead, double share,
-                   const ServoObserver& servo) const noexcept;
+  Vec6 referenceOf(const LegMotion& legs, double lead, double share, const ServoObserver& servo,
+                   double age) const noexcept;
 
   LegCodec codec_;
   ServoModel servo_;

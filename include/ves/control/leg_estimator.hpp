@@ -25,20 +25,18 @@ class LegEstimator {
   /// `following`: the legs follow what was sent.
   const Measured& update(const SampleStream& samples, const Elapsed& elapsed, bool following,
                          const LegCommander& sent) noexcept;
+  /// The command of `tick` leaves at `time` [ns] of the machine's clock.
+  void sent(const LegCounts& counts, std::int64_t tick, std::int64_t time) noexcept;
 
   const Measured& measured() const noexcept { return measured_; }
   const LegReadings& readings() const noexcept { return readings_; }
   const Vec6& recentSpeed() const noexcept { return speed_.speed(); }  // [m/s] as commanded
   const ServoObserver& servo() const noexcept { return servo_; }
-  /// Measured lengths, and rates and accelerations by the servo model as the sensor's filter shows
+  /// Measured lengths, and rates and accelerations by the servo model as the sample's wrench shows
   /// them.
-  LegMotion filteredMotion() const noexcept {
-    return {measured_.L, servo_.velocity(), servo_.filteredAcceleration()};
-  }
+  const LegMotion& feltMotion() const noexcept { return felt_; }
 
  private:
-  void observe(const Elapsed& elapsed, bool fresh, const LegCounts& sent) noexcept;
-
   Geometry geometry_;
   LegCodec codec_;
   double period_;        // [s]
@@ -48,6 +46,7 @@ class LegEstimator {
   LegReadings readings_;
   LegSpeed speed_;
   Measured measured_;
+  LegMotion felt_;
 };
 
 }  // namespace ves

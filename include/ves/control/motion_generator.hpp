@@ -14,17 +14,15 @@ class MotionGenerator {
       : settings_{config.periodSeconds(), config.gentle}, path_(config.path), admittance_(config) {}
 
   /// Begins a segment at `tick` from what was last commanded; admittance control with the composite
-  /// body M_1.
-  void begin(const Segment& segment, std::int64_t tick, const Mat6& M_1) noexcept;
+  /// body M_1 and a wrench `age` [s] old.
+  void begin(const Segment& segment, std::int64_t tick, const Mat6& M_1, double age) noexcept;
   /// Begins to brake, and then to stay.
   void brake(const Braking& braking) noexcept;
   /// Begins a gentle move to the home pose.
   void goHome() noexcept;
 
-  /// (C.2) to (C.7): the next state of the base under F_Po_I. `L` [m]: lengths last commanded.
-  PathPoint<6> admittanceModel(const Wrench& F_Po_I, const Mat6& M_1, double share,
-                               const JointVector& q, const Vec6& L,
-                               const PathChecks& checks) noexcept;
+  /// (C.2) to (C.7): the next state of the base.
+  PathPoint<6> admittanceModel(const AdmittanceInput& in, const PathChecks& checks) noexcept;
   /// (C.8) to (C.10), moves and recorded paths: where to be in this tick.
   PathPoint<6> trajectoryGeneration() noexcept;
 

@@ -43,15 +43,15 @@ class StaticLoad {
  public:
   explicit StaticLoad(const ControllerConfig& config);
 
-  /// For joints at q, the platform turned by R_IP. `share` [-] of the compensation is in;
-  /// `engaged`: the legs follow, so that the weight has a past.
-  void update(const Payload& payload, const JointVector& q, const Mat3& R_IP, bool engaged,
-              double share) noexcept;
+  /// For joints at q, the platform turned by R_IP, `since` [s] after the time before. `share` [-]
+  /// of the compensation is in; `engaged`: the legs follow, so that the weight has a past.
+  void update(const Payload& payload, const JointVector& q, const Mat3& R_IP, double since,
+              bool engaged, double share) noexcept;
 
   /// [count] what the weight alone would read, without a bias.
   const Vec6& counts() const noexcept { return counts_; }
   /// F_So_S, on its way to the filtered one of the inertia's compensation: a turn of the robot
-  /// moves the weight at once, the measurement only after the sensor's filter.
+  /// moves the weight at once, the measurement only after the sensor's filter and mean.
   const Wrench& wrench() const noexcept { return F_So_S_; }
 
  private:
@@ -59,7 +59,7 @@ class StaticLoad {
   Mat6 S_proc_;  // [count per N | N m]
   bool filters_;
   Butterworth2<6> filter_;  // the sensor's
-  Butterworth2<6>::Step filter_step_;
+  bool averages_;           // the sensor's readings, over about the time between two of its samples
   Vec6 counts_ = Vec6::Zero();
   Wrench F_So_S_;
 };
@@ -71,7 +71,7 @@ class RobotInertia {
 
   /// F_Po_I that it takes to move the composite body; zero when that is not compensated, or before
   /// the legs are `engaged`. `count` [-] of the tick; `legs` with the accelerations that the
-  /// sensor's filter shows; `share` [-] of the compensation that is in.
+  /// wrench shows; `share` [-] of the compensation that is in.
   Wrench update(const KnownPayload& known, std::int64_t count, const JointVector& q,
                 const Transform& X_IP, const LegMotion& legs, bool engaged, double share) noexcept;
 
@@ -81,6 +81,7 @@ class RobotInertia {
  private:
   bool compensated_;
   int mass_update_;  // [-] ticks for which a composite body is kept
+  double scale_;     // [-] of it that the wrench shows
   Geometry geometry_;
   RigidBody composite_P_;
   Mat6 M_1_ = Mat6::Zero();

@@ -12,6 +12,8 @@
 // before that, and r reaches it `delay` after the tick that sent it.
 #pragma once
 
+#include <array>
+
 #include "ves/control/leg_communication.hpp"
 #include "ves/kinematics/stewart.hpp"
 #include "ves/math/butterworth.hpp"
@@ -28,14 +30,18 @@ struct ServoModel {
   double reading_age = 0.0;     // [s] a
   double rail = 0.0;            // [m] E at the D/A converter's full scale
   double sensor_cutoff = 0.0;   // [rad/s] of the filter that the wrench passes
+  double sensor_window = 0.0;   // [s] over which its readings are averaged; 0: one reading
+  double sensor_delay = 0.0;    // [s] by which it is later than all of that says
+  double sensor_scale = 1.0;    // [-] of the robot's modelled inertia that it shows
   LegCodec readings;            // of the transducers
   double jitter = 0.0;          // [s] by which the time of a reading may be wrong
 };
 
-/// [s] by which a wrench is late where the admittance model uses it: the sensor's filter, and half
-/// of the period for which it is held.
+/// [s] by which a wrench is late where the admittance model uses it: the sensor's filter, its mean,
+/// and half of the period for which it is held.
 inline double wrenchDelay(const ServoModel& servo, double period) noexcept {
-  return M_SQRT2 / servo.sensor_cutoff + 0.5 * period;
+  return M_SQRT2 / servo.sensor_cutoff + 0.5 * servo.sensor_window + servo.sensor_delay +
+         0.5 * period;
 }
 
 /// Reference that takes each leg where `legs` says: the inverse of the closed servo, which is of
@@ -49,8 +55,10 @@ Vec6 feedForward(const ServoModel& servo, const LegMotion& legs, double lead, do
                  double share) noexcept;
 
 /// Runs the servo model beside the servos, counts and all: speed and acceleration of the legs,
-/// which nothing measures, the acceleration as the wrench's filter shows it, and the length below a
-/// count.
+/// which nothing measures, the acceleration as the wrench shows it, and the length below a count.
+///
+/// It is where the newest sample was taken, not where the tick is: what a sample says is compared
+/// with the model at its own time, however old it is. All times are [ns] of the machine's clock.
 ///
 /// A reading bounds the length to its count; the estimate is moved no further than to the count's
 /// edge, so what the model knows below a count stays.
@@ -60,23 +68,31 @@ class ServoObserver {
   /// unknown, and it drifts through all values.
   ServoObserver(const ServoModel& servo, double period, double phase = 0.5);
 
-  /// At rest at L.
-  void reset(const Vec6& L) noexcept;
+  /// At rest at L, where all commands so far have led.
+  void reset(const Vec6& L, std::int64_t time) noexcept;
 
-  /// A period passes under `reference`.
-  void advance(const Vec6& reference) noexcept;
+  /// Command `tick` leaves at `time`; it counts as arrived then until arrived() knows better.
+  void send(const Vec6& reference, std::int64_t tick, std::int64_t time) noexcept;
+  void arrived(std::int64_t tick, std::int64_t time) noexcept;
 
-  /// What the transducers read now.
-  void correct(const Vec6& L) noexcept;
+  /// On to `time`; after more than a few periods the model has come to rest, and the rest is left
+  /// out.
+  void advance(std::int64_t time) noexcept;
+
+  /// What the transducers read at `time`, now or before.
+  void correct(const Vec6& L, std::int64_t time) noexcept;
 
   const Vec6& length() const noexcept { return L_; }    // [m]
   const Vec6& velocity() const noexcept { return v_; }  // [m/s]
-  /// [m] what the LegSlaves' readings will be too long, on average over the coming period, the legs
-  /// moving on at L_dot. Adding this offset to the reference cancels the quantisation; without it a
-  /// leg comes to rest at the edge of a count, wherever in the count it should be.
-  Vec6 rounding(const Vec6& L_dot) const noexcept;
-  /// [m/s^2] behind the wrench's filter.
-  Vec6 filteredAcceleration() const noexcept { return filter_.output().matrix(); }
+  /// [m] what the LegSlaves' readings will be too long, on average over a period that begins
+  /// `later` [s], the legs moving on at L_dot. Adding this offset to the reference cancels the
+  /// quantisation; without it a leg comes to rest at the edge of a count, wherever in the count it
+  /// should be.
+  Vec6 rounding(const Vec6& L_dot, double later) const noexcept;
+  /// [m/s^2] as the wrench that was read at `time` shows it: behind the sensor's filter, averaged
+  /// over the sensor's window, sensor_delay before. The mean of the filtered acceleration is the
+  /// change of the filtered speed.
+  Vec6 filteredAcceleration(std::int64_t time) const noexcept;
 
  private:
   using Channels = Eigen::Array<double, kLegs, 1>;
@@ -87,18 +103,38 @@ class ServoObserver {
     Channels decay;   // e^{-dt/tau}
     Butterworth2<kLegs>::Step filter;
   };
+  struct Command {
+    std::int64_t tick = -1, time = 0;  // [-], [ns] when it came
+    Vec6 reference = Vec6::Zero();     // [m]
+  };
+  struct Instant {
+    std::int64_t time = 0;  // [ns]
+    Vec6 L = Vec6::Zero(), v = Vec6::Zero();
+    Vec6 filtered_v = Vec6::Zero(), filtered_a = Vec6::Zero(), filtered_a_rate = Vec6::Zero();
+  };
   Passage passage(double dt) const noexcept;
   double reading(int leg, double L, double v) const noexcept;
+  double reference(int leg) const noexcept;
   void pass(const Passage& passage) noexcept;
-  void update(const Vec6& reference) noexcept;
+  void update() noexcept;
+  void remember() noexcept;
+  Instant at(std::int64_t time) const noexcept;
+
+  static constexpr std::size_t kCommands = 16;
+  static constexpr std::size_t kInstants = 64;  // [-] three periods at least
 
   ServoModel servo_;
-  double period_;
-  double to_update_;  // [s] until the next one
+  std::int64_t period_;   // [ns] of the controller
+  std::int64_t between_;  // [ns] two instants that are remembered, at least
+  double to_update_;      // [s] until the next one
   Butterworth2<kLegs> filter_;
-  Passage whole_;  // of an update
+  Passage whole_;         // of an update
+  std::int64_t now_ = 0;  // [ns]
   Vec6 L_ = Vec6::Zero(), v_ = Vec6::Zero(), v_end_ = Vec6::Zero();
-  Vec6 reference_ = Vec6::Zero();  // of the period before
+  std::array<Command, kCommands> commands_{};  // rings: the newest at the number so far, less one
+  std::size_t sent_ = 0;
+  std::array<Instant, kInstants> past_{};
+  std::size_t remembered_ = 0;
 };
 
 }  // namespace ves

@@ -20,6 +20,7 @@ struct Situation {
   int fresh_ticks;        // [-] in a row
   const Wrench& dynamic;  // F_Po_I
   const Mat6& M_1;        // of the composite body that is compensated
+  double age;             // [s] of the wrench
   const Vec6& L;          // [m] lengths last commanded
 };
 

@@ -40,18 +40,35 @@ class TickClock {
   std::int64_t idle_ = 0;  // [-]
 };
 
+/// When a tick's wrench was read.
+struct WrenchTiming {
+  double since = 0.0;  // [s] after the one before; 0: there is no new one
+  double age = 0.0;    // [s] before the tick
+};
+
 /// The newest sample and its age.
 class SampleStream {
  public:
+  explicit SampleStream(std::int64_t period) : period_(period) {}  // [ns]
+
   /// An older sample than the last is none, while the legs are ours; before that, a machine may
-  /// begin anew. One whose clock stands still is not new either.
-  void update(const Sample& newest, bool engaged, bool conflict) noexcept {
-    const std::int64_t last = sample_.sequence, last_time = sample_.time;
-    if (!(engaged && newest.sequence < last)) sample_ = newest;
+  /// begin anew. One whose clock stands still is not new either. `now` [ns]: of the machine's
+  /// clock.
+  void update(const Sample& newest, std::int64_t now, bool engaged, bool conflict) noexcept {
+    const Sample before = sample_;
+    if (!(engaged && newest.sequence < before.sequence)) sample_ = newest;
     age_before_ = age_;
-    const bool newer = sample_.sequence > last && (sample_.time > last_time || last < 0);
+    const bool first = before.sequence < 0;
+    const bool newer = sample_.sequence > before.sequence && (sample_.time > before.time || first);
     age_ = newer ? 0 : age_ + 1;
     fresh_ticks_ = fresh() && !conflict ? fresh_ticks_ + 1 : 0;
+    const auto seconds = [this](std::int64_t time) {
+      constexpr std::int64_t kMostPeriods = 5;  // [-] more says nothing of now
+      return static_cast<double>(std::clamp<std::int64_t>(time, 0, kMostPeriods * period_)) *
+             kSecondPerNanosecond;
+    };
+    wrench_ = {seconds(first ? period_ : sample_.wrench_time - before.wrench_time),
+               seconds(now - sample_.wrench_time)};
   }
   /// The count of fresh ticks begins anew.
   void restart() noexcept { fresh_ticks_ = 0; }
@@ -61,9 +78,12 @@ class SampleStream {
   int age() const noexcept { return age_; }                 // [-] ticks since the sample was new
   int ageBefore() const noexcept { return age_before_; }    // [-] the same in the tick before
   int freshTicks() const noexcept { return fresh_ticks_; }  // [-] in a row, without a conflict
+  const WrenchTiming& wrench() const noexcept { return wrench_; }
 
  private:
+  std::int64_t period_;  // [ns]
   Sample sample_;
+  WrenchTiming wrench_;
   int age_ = 0, age_before_ = 0;
   int fresh_ticks_ = 0;
 };

@@ -28,6 +28,7 @@ std::string_view name(Phase phase) noexcept;
 
 struct TickInput {
   std::int64_t tick = 0;  // [-] counts controller periods, missed ones included
+  std::int64_t time = 0;  // [ns] when it began, by the machine's clock
   Sample sample;          // the newest
   Order order;
   bool conflicting_node = false;  // another controller or machine was heard since the last tick

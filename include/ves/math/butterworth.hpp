@@ -50,6 +50,7 @@ class Butterworth2 {
   void jump(const Channels& u) noexcept { u_ = u; }
 
   const Channels& output() const noexcept { return y_; }
+  const Channels& rate() const noexcept { return y_dot_; }  // of the output
 
  private:
   double w_;                           // [rad/s]

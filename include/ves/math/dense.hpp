@@ -17,6 +17,13 @@ Eigen::VectorXcd eigenvector(const Eigen::MatrixXd& A, std::complex<double> eige
 /// Of a symmetric matrix, the smallest first. Reads the lower triangle.
 Eigen::VectorXd symmetricEigenvalues(const Eigen::MatrixXd& A);
 
+/// The same and their vectors, columns of length one.
+struct SymmetricEigen {
+  Eigen::VectorXd values;
+  Eigen::MatrixXd vectors;
+};
+SymmetricEigen symmetricEigen(const Eigen::MatrixXd& A);
+
 /// e^A of a square matrix.
 Eigen::MatrixXd exponential(const Eigen::MatrixXd& A);
 

@@ -7,7 +7,9 @@
 //   the
 //                  middle of the constant current, one step of the mechanics: forward kinematics,
 //                  Newton-Euler on the moving base, force-torque sensor
-//   when asked     a sample, at that very moment
+//   when asked     a sample, at that very moment; or, where the A/D converter averages, its
+//   readings
+//                  over the last controller period, in the middles of its equal parts
 //
 // The periods are no multiples of each other. Between events the actuators are integrated exactly.
 #pragma once
@@ -64,6 +66,8 @@ struct PlantConfig {
   LegFilters filters = LegFilters::kNone;
   double filter_cutoff = 30.0;  // [rad/s] of Filters 1 to 3
   ForceTorqueSensorModel sensor;
+  int sensor_readings = 1;         // [-] that a sample's wrench is the mean of,
+  std::int64_t sensor_window = 0;  // [ns] and over which; 1: read when asked
   Climate climate;
   Payload payload;                   // as it is
   Vec3 gravity = {0.0, 0.0, -9.81};  // [m/s^2] g_I
@@ -130,6 +134,8 @@ class Plant {
   double current(std::size_t leg) const noexcept;
   void readTransducers() noexcept;
   void stepMechanics() noexcept;
+  void readSensor() noexcept;
+  void averageSensor(Sample& sample) const noexcept;
   void planRobotEvent() noexcept;
   void startRobotEvents() noexcept;
   Wrench sensorLoad() const noexcept;
@@ -151,6 +157,10 @@ class Plant {
   std::int64_t last_step_ = 0;                     // [ns] mechanics and sensor are here
   std::int64_t next_reading_ = kTransducerPeriod;  // [ns]
   std::int64_t next_step_ = 0;                     // [ns]
+  std::int64_t sensor_interval_ = 0;               // [ns] between two readings that are averaged
+  std::int64_t next_sensor_ = kNever;              // [ns]
+  std::vector<AdcCounts> sensor_readings_;         // a ring, a reading longer than the window
+  std::size_t read_ = 0;                           // [-] readings so far
   std::int64_t sequence_ = -1;
   std::int64_t segment_ = -1;                           // of the last command
   std::int64_t segment_start_ = 0;                      // [ns]

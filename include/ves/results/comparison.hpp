@@ -28,7 +28,7 @@ void eachTick(const Series& series, const std::function<void(const Row&, double)
 /// What the admittance model commanded, each state at the time it is for.
 Motion commanded(const Series& series);
 
-/// Where the platform truly was, without rates.
+/// Where the platform truly was and when, without rates.
 Motion actual(const Series& series);
 
 Motion motion(const std::vector<InteractionPoint>& points);
@@ -39,7 +39,7 @@ struct Distance {
   double rms_attitude = 0.0, peak_attitude = 0.0;  // [rad]
 };
 
-/// Of two motions over the time they share.
+/// Of two motions, at the times of the first that the second has too.
 Distance distance(const Motion& a, const Motion& b);
 
 /// Of a motion from where it began.

@@ -22,6 +22,7 @@ static_assert(static_cast<int>(Phase::kStopping) == 6);
 template <typename F>
 void forEachField(const state_t& m, F f) {
   f("count", m.count);
+  f("machine_time_ns", m.machine_time_ns);
   f("sample_sequence", m.sample_sequence);
   f("request", m.request);
   f("order_source", m.order_source);
