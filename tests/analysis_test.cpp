@@ -11,6 +11,7 @@
 #include "ves/analysis/gate.hpp"
 #include "ves/analysis/loop.hpp"
 #include "ves/math/dense.hpp"
+#include "ves/results/comparison.hpp"
 #include "ves/run/run.hpp"
 #include "ves/srms/modes.hpp"
 
@@ -265,6 +266,27 @@ TEST(LoopModel, DelayOfATickIsALongerLag) {
   const double r = massRatios(loop.base, loop.robot_P)(0), w = 2 * M_PI * after.frequency;
   EXPECT_NEAR(before - after.growth, r * w * w * loop.period / (2 * (1 + r)),
               0.1 * std::abs(before));
+}
+
+TEST(Distance, ComparesTwoMotionsAtTheTimesOfTheFirst) {
+  Motion wave, seen;
+  for (int n = 0; n <= 100; ++n) {
+    const double t = 0.01 * n;
+    wave.t.push_back(t);
+    wave.x.push_back(Vec6::Constant(0.01 * std::sin(6.0 * t)));
+    wave.x_dot.push_back(Vec6::Constant(0.06 * std::cos(6.0 * t)));
+  }
+  for (double t = -0.02; t < 1.1; t += 0.0137) {  // outside the wave nothing is compared
+    seen.t.push_back(t);
+    seen.x.push_back(Vec6::Constant(0.01 * std::sin(6.0 * t) + (t < 0.0 || t > 1.0 ? 5.0 : 0.0)));
+  }
+  EXPECT_LT(distance(seen, wave).peak_position, 1e-8);
+  Motion later = seen;
+  for (double& t : later.t) t += 1e-3;
+  EXPECT_NEAR(distance(later, wave).peak_position, std::sqrt(3.0) * 6e-5, 2e-6);
+  wave.x_dot.clear();  // by lines
+  EXPECT_LT(distance(seen, wave).peak_position, 1e-5);
+  EXPECT_GT(distance(seen, wave).peak_position, 1e-7);
 }
 
 }  // namespace

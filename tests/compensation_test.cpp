@@ -253,6 +253,70 @@ TEST_F(Emulation, LoopModelKnowsTheCompensation) {
   EXPECT_GT(unstable, 1);
 }
 
+TEST_F(Emulation, LoopModelKnowsAWrenchThatIsLaterThanBelieved) {
+  // A light base of 1 Hz, the converter read once a tick or averaged: the sensor's filter slower or
+  // quicker than believed. Read once, what is a little early drives it.
+  int stable = 0, unstable = 0;
+  for (const std::vector<std::string>& readings : {kPublished, kMean})
+    for (const double late : {-3e-3, -2e-3, -1e-3, 1e-3, 2e-3, 3e-3}) {
+      Experiment e =
+          experiment("puma_on_table_4_1", kAll, with(lightBase(5.0, 1.0, 0.01), readings));
+      Loop loop = loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kSwinging);
+      loop.late = late;
+      const DominantRoot root = dominantRoot(loop);
+      e.plant.sensor.cutoff = M_SQRT2 / (M_SQRT2 / e.plant.sensor.cutoff + late);
+      const Series series = run(e);
+      double first = 0.0, last = 0.0;  // rates in the first and the last three seconds
+      std::vector<double> rates;
+      for (const Row& row : series.rows)
+        if (inAdmittance(row.state)) rates.push_back(Vec6::Map(row.state.x_dot).norm());
+      for (std::size_t i = 0; i < rates.size(); ++i) {
+        if (i < 300) first = std::max(first, rates[i]);
+        if (i + 300 >= rates.size()) last = std::max(last, rates[i]);
+      }
+      const bool grows = !result_.good() || last > first;
+      const std::string what = std::to_string(e.plant.sensor_readings) + " readings, " +
+                               std::to_string(late) + " s: " + std::to_string(root.growth);
+      if (std::abs(root.growth) < 0.02) continue;  // too slow to tell in twelve seconds
+      (root.growth > 0.0 ? unstable : stable) += 1;
+      EXPECT_EQ(grows, root.growth > 0.0) << what;
+    }
+  EXPECT_GE(stable, 2);
+  EXPECT_GE(unstable, 2);
+}
+
+TEST_F(Emulation, GateHoldsForWhatTheBeliefMayBeOffBy) {
+  const std::vector<std::string> base = lightBase(5.0, 3.0, 0.02);
+  const Experiment e = assessed("puma_on_table_4_1", kAll, base);
+  EXPECT_EQ(e.controller.stability, Stability::kUnstable);
+  const LoopVerdict v = assessStability(e.controller, e.plant);
+  EXPECT_TRUE(v.as_believed);
+  EXPECT_FALSE(v.stable);
+  EXPECT_NE(explain(v).find("would decay as believed, but diverge with a wrench 0.5 ms earlier"),
+            std::string::npos)
+      << explain(v);
+  EXPECT_EQ(assessed("puma_on_table_4_1", kAll,
+                     with(base, {"controller.compensation.timing_error_s=0",
+                                 "controller.compensation.gain_error=0",
+                                 "controller.compensation.mass_error=0"}))
+                .controller.stability,
+            Stability::kStable);
+  // Each of the three, added to what the loop bears.
+  const std::vector<std::string> heavy = with(lightBase(5.0, 3.0, 0.02), kMean);
+  const auto verdict = [&](const char* timing, const char* gain, const char* mass) {
+    const std::string key = "controller.compensation.";
+    return assessed("puma_on_table_4_1", kAll,
+                    with(heavy, {key + "timing_error_s=" + timing, key + "gain_error=" + gain,
+                                 key + "mass_error=" + mass}))
+        .controller.stability;
+  };
+  EXPECT_EQ(verdict("0", "0.1", "0"), Stability::kStable);
+  EXPECT_EQ(verdict("0", "0.4", "0"), Stability::kUnstable);
+  EXPECT_EQ(verdict("0.004", "0", "0"), Stability::kUnstable);
+  EXPECT_EQ(verdict("0", "0", "0.5"), Stability::kStable);
+  EXPECT_EQ(verdict("0", "0.1", "0.5"), Stability::kUnstable);
+}
+
 TEST_F(Emulation, ComesInWithoutABump) {
   // From arming on, held still: no leg leaves its place by more than a count while the share rises.
   const Experiment e =
@@ -408,6 +472,13 @@ TEST(ServoIdentification, FindsWhatTheMachineIs) {
     EXPECT_EQ(read.delay, found.servo.delay);
     EXPECT_EQ(read.sensor_delay, -2e-4);
     EXPECT_EQ(read.sensor_scale, 1.02);
+    // The gate then allows for three deviations.
+    const ServoRecord again = readServo(Section(text, ""));
+    const Compensation allowed = withRecord(Compensation(), again);
+    EXPECT_EQ(allowed.timing_error, 3.0 * 1e-5);
+    EXPECT_EQ(allowed.mass_error, 3.0 * 1e-3);
+    EXPECT_GT(allowed.gain_error, 2.9 * found.deviation.extend(0) / found.servo.extend(0));
+    EXPECT_LT(allowed.gain_error, 0.05);
   }
 }
 

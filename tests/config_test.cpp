@@ -92,6 +92,25 @@ TEST(Config, EveryMachineNumberIsTheReportsOrTagged) {
     check(loadDocument(fs::path(test::configDir()) / file), "", false);
 }
 
+TEST(Config, ReadingsDivideTheControllersPeriod) {
+  const auto load = [](const std::string& set) {
+    return loadExperiment(test::configDir() + "/scenarios/free_decay.yaml", {set});
+  };
+  const Experiment once = load("sensor.readings_per_tick=1");
+  EXPECT_EQ(once.plant.sensor_window, 0);
+  EXPECT_EQ(once.controller.servo.sensor_window, 0.0);
+  const Experiment mean = load("sensor.readings_per_tick=4");
+  EXPECT_EQ(mean.plant.sensor_readings, 4);
+  EXPECT_EQ(mean.plant.sensor_window, mean.controller.period);
+  EXPECT_EQ(mean.controller.servo.sensor_window, mean.controller.periodSeconds());
+  EXPECT_NE(test::refusal([&] {
+              load("sensor.readings_per_tick=3");
+            }).find("3 readings and their middles do not divide the controller's period"),
+            std::string::npos);
+  EXPECT_NE(test::refusal([&] { load("sensor.readings_per_tick=0"); }).find("want"),
+            std::string::npos);
+}
+
 TEST(Config, AnotherBaseReplacesTheMachinesOwn) {
   const auto base = [](const std::string& value) {
     return loadExperiment(scenarios() / "free_decay.yaml", {"base=" + value}).controller.admittance;

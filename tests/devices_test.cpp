@@ -130,7 +130,7 @@ Mat6 proc() {
 const NetFtCalibration kCalibration{1e6, 2e6, "FT27462"};
 
 struct Stream {
-  RdtStream stream{kCalibration, proc()};
+  RdtStream stream{kCalibration, proc(), 0};
   std::int64_t now = 0;
   void take(const Record& r) {
     const auto bytes = bytesOf(r);
@@ -154,12 +154,39 @@ TEST(Rdt, CountsAreScaledByTheSensorsOwnCalibration) {
   EXPECT_FALSE(w.fault);
   // Beyond the 16 bits of the converter: its end, which the controller knows as saturated.
   s.take({2, 10, 0, {2'147'483'647, -2'147'483'647 - 1, 0, 0, 0, 0}});
-  RdtStream steep(kCalibration, 100.0 * proc());
+  RdtStream steep(kCalibration, 100.0 * proc(), 0);
   const auto bytes = bytesOf({1, 1, 0, {2'147'483'647, -2'147'483'647 - 1, 0, 0, 0, 0}});
   steep.take(bytes.data(), bytes.size(), 1);
   ASSERT_TRUE(steep.read(w));
   EXPECT_EQ(w.counts[0], 32767);
   EXPECT_EQ(w.counts[1], -32768);
+}
+
+TEST(Rdt, AWindowIsTheMeanOfItsRecordsAndAsFaultyAsTheWorst) {
+  RdtStream stream(kCalibration, proc(), 10'000'000);
+  const auto take = [&](std::uint32_t n, int newtons, std::uint32_t status = 0) {
+    const auto bytes = bytesOf({n, n, status, {newtons * 1'000'000, 0, 0, 0, 0, 0}});
+    stream.take(bytes.data(), bytes.size(), n * 1'000'000);
+  };
+  WrenchReading w;
+  take(1, 8);
+  ASSERT_TRUE(stream.read(w));
+  EXPECT_EQ(w.counts[0], 80);  // of what there is
+  for (std::uint32_t n = 2; n <= 40; ++n) take(n, static_cast<int>(n) * (n % 2 == 0 ? 2 : 0));
+  ASSERT_TRUE(stream.read(w));
+  EXPECT_EQ(w.counts[0], 360);  // 32, 34, .. 40 twice, and five zeros: the newest ten
+  EXPECT_EQ(w.time, 40'000'000);
+  EXPECT_FALSE(w.fault);
+  take(41, 0, 0x80020000);
+  for (std::uint32_t n = 42; n <= 52; ++n) {
+    ASSERT_TRUE(stream.read(w));
+    EXPECT_EQ(w.fault, n <= 51) << n;
+    take(n, 0);
+  }
+  take(80, 5);  // after a gap that one alone
+  ASSERT_TRUE(stream.read(w));
+  EXPECT_EQ(w.counts[0], 50);
+  EXPECT_FALSE(w.fault);
 }
 
 TEST(Rdt, LossRepetitionDisorderAndTheWrapAreCounted) {
@@ -266,7 +293,7 @@ TEST(NetFt, ReadsRecordsWithTheirTimeAsksAgainAndNeverTakesABias) {
   sensor.configure({});
   WrenchReading w;
   {
-    NetFt driver(addressOf(sensor), proc());
+    NetFt driver(addressOf(sensor), proc(), 0);
     while (!sensor.streaming()) usleep(500);
     EXPECT_FALSE(driver.read(w));
     const std::int64_t before = monotonicNow();
@@ -311,7 +338,7 @@ TEST(NetFt, ReadsRecordsWithTheirTimeAsksAgainAndNeverTakesABias) {
 TEST(NetFt, WhoIsNoSensorIsRefusedInOneLine) {
   rdt_test::Sensor sensor;
   const auto refused = [&] {
-    return test::refusal([&] { NetFt driver(addressOf(sensor), proc()); });
+    return test::refusal([&] { NetFt driver(addressOf(sensor), proc(), 0); });
   };
   sensor.setXml("<netft></netft>");
   EXPECT_NE(refused().find("cfgcpf: missing"), std::string::npos) << refused();
@@ -322,7 +349,7 @@ TEST(NetFt, WhoIsNoSensorIsRefusedInOneLine) {
   sensor.setXml(std::string(100'000, 'x'));
   EXPECT_NE(refused().find("longer than 64 kB"), std::string::npos) << refused();
   const NetFtAddress nobody{"127.0.0.1", 9, 9};
-  EXPECT_NE(test::refusal([&] { NetFt driver(nobody, proc()); }).find("127.0.0.1:9"),
+  EXPECT_NE(test::refusal([&] { NetFt driver(nobody, proc(), 0); }).find("127.0.0.1:9"),
             std::string::npos);
 }
 

@@ -47,6 +47,7 @@ ModalHold modalHold(const ModalModel& model, double dt) {
 
 ModalDynamics::ModalDynamics(const ModalModel& model)
     : Phi_(model.Phi),
+      compliance_(Phi_ * Phi_.transpose()),
       k_(model.stiffness),
       c_(model.damping.diagonal()),
       coupled_(!model.damping.isDiagonal(0.0)) {
@@ -125,10 +126,10 @@ ModalDynamics ModalDynamics::withoutDampingAbove(double most) const noexcept {
 
 /// Woodbury: (1 + Phi^T M_1 Phi)^-1 = 1 - Phi^T (1 + M_1 Phi Phi^T)^-1 M_1 Phi.
 ModalDynamics::Body ModalDynamics::body(const Mat6& M_1) const noexcept {
-  const Mat6 left = Mat6::Identity() + M_1 * (Phi_ * Phi_.transpose());
-  const Mat6 X = left.partialPivLu().solve(M_1);
+  const Mat6 left = Mat6::Identity() + M_1.lazyProduct(compliance_);
+  const Mat6 X = left.inverse().lazyProduct(M_1);
   Body out;
-  out.pull.noalias() = X * Phi_;
+  out.pull = X.lazyProduct(Phi_);
   return out;
 }
 
@@ -149,20 +150,22 @@ ModalDynamics::Modes ModalDynamics::advance(const Body& body, double dt, const M
   const int steps = std::max(
       1, static_cast<int>(std::ceil(std::abs(dt) * (fastest_ + most_damping_) / kMostAngle)));
   const double h = dt / steps;
-  const auto size_of = [this](const Modes& m) {
+  const auto sizeOf = [this](const Modes& m) {
     return fastest_ * m.eta.cwiseAbs().sum() + m.eta_dot.cwiseAbs().sum();
   };
   const Forces none = Forces::Zero(size());
-  Modes sum = from;
+  Modes sum = from, term;  // by elements: a whole one is as long as kMaxModes
   for (int n = 0; n < steps; ++n) {
     // Of {eta, eta'}: its derivative number j times h^j/j!.
-    Modes term = {h * sum.eta_dot, h * acceleration(body, sum, u)};
+    term.eta = h * sum.eta_dot;
+    term.eta_dot = h * acceleration(body, sum, u);
     for (int j = 2; j <= kMostTerms; ++j) {
       sum.eta += term.eta;
       sum.eta_dot += term.eta_dot;
-      if (!(size_of(term) > kNegligible * size_of(sum))) break;
-      const double factor = h / j;
-      term = {factor * term.eta_dot, factor * acceleration(body, term, none)};
+      if (!(sizeOf(term) > kNegligible * sizeOf(sum))) break;
+      const Vector<kMaxModes> next = acceleration(body, term, none);
+      term.eta = (h / j) * term.eta_dot;
+      term.eta_dot = (h / j) * next;
     }
   }
   return sum;

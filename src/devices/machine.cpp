@@ -16,7 +16,8 @@ Machine::Machine(const Experiment& experiment, Bus& bus)
   if (m.legs == Source::kExternal) real_legs_ = std::make_unique<LegsOnBus>(bus);
   if (m.force_sensor == Source::kExternal) real_sensor_ = std::make_unique<ForceSensorOnBus>(bus);
   if (m.force_sensor == Source::kNetFt)
-    real_sensor_ = std::make_unique<NetFt>(m.net_ft, experiment.plant.sensor.S_proc());
+    real_sensor_ = std::make_unique<NetFt>(m.net_ft, experiment.plant.sensor.S_proc(),
+                                           experiment.plant.sensor_window);
   if (m.robot == Source::kExternal) real_robot_ = std::make_unique<RobotOnBus>(bus);
   if (m.switches == Source::kExternal) real_switches_ = std::make_unique<SwitchesOnBus>(bus);
 }

@@ -91,10 +91,10 @@ std::string fetchNetFtXml(const NetFtAddress& address, int patience) {
   return answer;
 }
 
-NetFt::NetFt(const NetFtAddress& address, const Mat6& S_proc)
+NetFt::NetFt(const NetFtAddress& address, const Mat6& S_proc, std::int64_t window)
     : address_(address),
       calibration_(netFtCalibration(fetchNetFtXml(address, kPatience))),
-      stream_(calibration_, S_proc),
+      stream_(calibration_, S_proc, window),
       socket_(connected(address, address.port, SOCK_DGRAM)) {
   const int on = 1, room = 1 << 20;
   setsockopt(socket_, SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof on);

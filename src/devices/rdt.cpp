@@ -135,7 +135,8 @@ std::string netFtXml(const NetFtCalibration& calibration, int records_per_second
       records_per_second);
 }
 
-RdtStream::RdtStream(const NetFtCalibration& c, const Mat6& S_proc) noexcept {
+RdtStream::RdtStream(const NetFtCalibration& c, const Mat6& S_proc, std::int64_t window) noexcept
+    : window_(window) {
   Vec6 per_count;
   per_count << Vec3::Constant(1.0 / c.counts_per_newton),
       Vec3::Constant(1.0 / c.counts_per_newton_metre);
@@ -149,31 +150,37 @@ void RdtStream::take(const std::uint8_t* data, std::size_t size, std::int64_t ti
     return;
   }
   if (known_) {
-    const auto ahead = static_cast<std::int32_t>(record->sequence - newest_.sequence);
+    const auto ahead = static_cast<std::int32_t>(record->sequence - newest().record.sequence);
     if (ahead <= 0) {
       ++(ahead == 0 ? counters_.repeated : counters_.late);
       return;
     }
     counters_.lost += ahead - 1;
   }
-  known_ = any_ = true;
-  newest_ = *record;
-  time_ = time;
+  known_ = true;
+  taken_[count_++ % taken_.size()] = {*record, time};
   ++counters_.records;
 }
 
 bool RdtStream::read(WrenchReading& out) const noexcept {
-  if (!any_) return false;
-  Vec6 counts;
-  for (int i = 0; i < kWrenchChannels; ++i) counts(i) = newest_.counts[static_cast<std::size_t>(i)];
-  const Vec6 converter = counts_per_count_ * counts;
+  if (count_ == 0) return false;
+  constexpr std::uint32_t kSummary = 0x80000000, kThreshold = 0x00010000;  // a latch, no error
+  Vec6 sum = Vec6::Zero();
+  std::size_t n = 0;
+  out.time = newest().time;
+  out.fault = false;
+  for (; n < std::min(count_, taken_.size()); ++n) {
+    const Taken& one = newest(n);
+    if (n > 0 && one.time <= out.time - window_) break;
+    for (int i = 0; i < kWrenchChannels; ++i)
+      sum(i) += one.record.counts[static_cast<std::size_t>(i)];
+    out.fault = out.fault || (one.record.status != 0 && one.record.status != kThreshold &&
+                              one.record.status != (kSummary | kThreshold));
+  }
+  const Vec6 converter = counts_per_count_ * (sum / static_cast<double>(n));
   for (int i = 0; i < kWrenchChannels; ++i)
     out.counts[static_cast<std::size_t>(i)] =
         static_cast<std::int32_t>(std::lround(std::clamp(converter(i), -32768.0, 32767.0)));
-  out.time = time_;
-  constexpr std::uint32_t kSummary = 0x80000000, kThreshold = 0x00010000;  // a latch, no error
-  out.fault = newest_.status != 0 && newest_.status != kThreshold &&
-              newest_.status != (kSummary | kThreshold);
   return true;
 }
 

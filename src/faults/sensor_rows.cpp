@@ -28,7 +28,8 @@ using Spoil = std::function<std::vector<RdtRecord>(RdtRecord record, bool fault)
 class Path {
  public:
   Path(const Experiment& e, Spoil spoil)
-      : stream_(kCalibration, e.plant.sensor.S_proc()), spoil_(std::move(spoil)) {}
+      : stream_(kCalibration, e.plant.sensor.S_proc(), e.plant.sensor_window),
+        spoil_(std::move(spoil)) {}
 
   void pass(const Wrench& F_So_S, bool fault, Sample& sample) {
     constexpr std::int64_t kApart = 1'000'000;  // [ns]
@@ -112,7 +113,8 @@ FaultOutcome otherCalibration(const fs::path& config) {
       server.serve(monotonicNow());
     }
   });
-  devices::NetFt driver({"127.0.0.1", server.port(), server.httpPort()}, e.plant.sensor.S_proc());
+  devices::NetFt driver({"127.0.0.1", server.port(), server.httpPort()}, e.plant.sensor.S_proc(),
+                        e.plant.sensor_window);
   const auto faulty = [&](std::int64_t seconds) {
     devices::WrenchReading reading;
     const std::int64_t end = monotonicNow() + seconds * 1'000'000'000;

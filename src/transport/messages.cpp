@@ -232,6 +232,7 @@ setup_t setupOf(const Experiment& e, bool lockstep, const header_t& header) {
   counts(legLengths(c.geometry, c.geometry.fromHome(Pose())), m.leg_home);
   m.leg_velocity = c.safety.leg_velocity;
   Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(m.wrench_per_count) = c.sensor.C_proc;
+  m.wrench_window_ns = e.plant.sensor_window;
   m.pressure_min = c.safety.pressure_min;
   m.pressure_max = c.safety.pressure_max;
   m.joints = c.payload.robot.joints;

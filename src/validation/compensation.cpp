@@ -7,11 +7,12 @@
 namespace ves {
 namespace {
 
-/// Parts of the compensation, as overrides.
+/// Parts of the compensation, as overrides; with the inertia the converter is averaged over a tick.
 Overrides compensation(bool feed_forward, bool observer, bool inertia) {
   return {fmt::format("controller.compensation.feed_forward={}", feed_forward),
           fmt::format("controller.compensation.observer={}", observer),
-          fmt::format("controller.compensation.inertia={}", inertia)};
+          fmt::format("controller.compensation.inertia={}", inertia),
+          fmt::format("sensor.readings_per_tick={}", inertia ? 4 : 1)};
 }
 struct Stage {
   const char* name;
@@ -47,8 +48,8 @@ void onTable41(Reproduction& r) {
       "Three parts that the report does not have, each off by default: the reference goes "
       "through the inverse of the closed servo (feed-forward); a model beside the servos knows "
       "their counts, speeds and accelerations (observer); the robot's inertia is taken out of "
-      "the wrench and put on the base's side of (3.11) (inertia). Counts and LegSlaves are in "
-      "every run.");
+      "the wrench and put on the base's side of (3.11) (inertia; the A/D converter is read four "
+      "times a tick then, and averaged). Counts and LegSlaves are in every run.");
   Numbers& n = r.numbers["beyond"];
   TableRows rows;
   struct Case {
@@ -178,6 +179,12 @@ void remains(Reproduction& r) {
       {"and the A/D converter four times finer",
        {quiet, "sensor.gain=[4000,4000,4000,4000,4000,4000]"}},
       {"and 200 Hz instead of 100", {quiet, "controller.period_ns=5000000"}},
+      {"without the noise, the converter read once a tick", {quiet, "sensor.readings_per_tick=1"}},
+      {"without the noise, samples three ticks late",
+       {quiet,
+        "program=[{move: {}, faults: [{at_s: 0, duration_s: 1000, fault: samples_late, samples: "
+        "3}]}, {calibration: {}}, {admittance: {duration_s: 20}, robot: [{at_s: 0, duration_s: 5, "
+        "joint: joint_3, to_deg_or_m: -60}]}]"}},
       {"without the noise, legs at the edge of their counts",
        {quiet, "controller.compensation.observer=false", "controller.compensation.inertia=false"}},
       {"without the noise, robot 5 percent heavier than modelled",

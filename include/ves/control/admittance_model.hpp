@@ -90,6 +90,7 @@ class ModalDynamics {
 
  private:
   Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, kMaxModes> Phi_;
+  Mat6 compliance_;      // Phi Phi^T: acceleration per wrench
   Vector<kMaxModes> k_;                        // [1/s^2]
   Vector<kMaxModes> c_;                        // [1/s] diagonal of the damping
   double fastest_ = 0.0, most_damping_ = 0.0;  // [rad/s], [1/s]

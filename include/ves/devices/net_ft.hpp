@@ -17,7 +17,7 @@ class NetFt : public ForceSensor {
   /// Reads the sensor's calibration from its web page and asks for records. A thread of its own
   /// looks once a second whether the calibration is still the same: another one is a fault. Throws
   /// InputError.
-  NetFt(const NetFtAddress& address, const Mat6& S_proc);
+  NetFt(const NetFtAddress& address, const Mat6& S_proc, std::int64_t window);
   ~NetFt() override;
   NetFt(const NetFt&) = delete;
   NetFt& operator=(const NetFt&) = delete;

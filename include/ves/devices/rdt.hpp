@@ -48,12 +48,13 @@ struct NetFtCalibration {
 NetFtCalibration netFtCalibration(std::string_view xml);
 std::string netFtXml(const NetFtCalibration& calibration, int records_per_second);
 
-/// The newest record of a stream that loses, repeats and reorders, as counts of the converter that
-/// the controller knows.
+/// The newest record of a stream that loses, repeats and reorders, or the mean of the newest ones,
+/// as counts of the converter that the controller knows.
 class RdtStream {
  public:
-  /// `S_proc` [count/N | count/(N m)] turns a wrench into those counts, (2.6).
-  RdtStream(const NetFtCalibration& calibration, const Mat6& S_proc) noexcept;
+  /// `S_proc` [count/N | count/(N m)] turns a wrench into those counts, (2.6). `window` [ns] before
+  /// the newest record is averaged; 0: that one alone.
+  RdtStream(const NetFtCalibration& calibration, const Mat6& S_proc, std::int64_t window) noexcept;
 
   struct Counters {
     std::int64_t records = 0;    // [-] taken
@@ -67,16 +68,24 @@ class RdtStream {
   void take(const std::uint8_t* data, std::size_t size, std::int64_t time) noexcept;
   /// The sensor begins anew: whatever comes next is the newest.
   void restart() noexcept { known_ = false; }
-  /// False before the first record. A status with any bit set is a
+  /// False before the first record. A status with any bit set, of any record of the window, is a
   /// fault, but for the latch of a threshold (bit 16), which is none.
   bool read(WrenchReading& out) const noexcept;
   const Counters& counters() const noexcept { return counters_; }
 
  private:
   Mat6 counts_per_count_;  // of the converter, of the sensor
-  bool known_ = false, any_ = false;
-  RdtRecord newest_;
-  std::int64_t time_ = 0;  // [ns]
+  std::int64_t window_;    // [ns]
+  bool known_ = false;
+  struct Taken {
+    RdtRecord record;
+    std::int64_t time = 0;  // [ns]
+  };
+  std::array<Taken, 256> taken_{};  // a ring: 36 ms of 7000 a second
+  std::size_t count_ = 0;           // [-] so far
+  const Taken& newest(std::size_t back = 0) const noexcept {
+    return taken_[(count_ - 1 - back) % taken_.size()];
+  }
   Counters counters_;
 };
 

@@ -1,0 +1,267 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Compensated emulations on machines that are not as the controller believes.
+//
+//   random_machines emulation N [SEED [SET...]]   the DOSS on the Shuttle's arm, six modes: gains,
+//       masses, centres of mass and tau off by up to 10 %, samples 0 to 3 ticks late, read and
+//       commanded up to 2 ms before and after their ticks; half of them on Earth
+//   random_machines gate N [SEED [SET...]]        a PUMA on bases near the limit of stability, off
+//       by what the gate allows for: what it admits beside what then grows
+//
+// SET is as for --set of ves run. All with the three parts of the compensation.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <atomic>
+#include <deque>
+#include <map>
+#include <random>
+#include <thread>
+
+#include "support/rig.hpp"
+#include "ves/analysis/gate.hpp"
+#include "ves/results/comparison.hpp"
+#include "ves/run/run.hpp"
+
+namespace ves {
+namespace {
+
+using Sets = std::vector<std::string>;
+const Sets kCompensated = {"controller.compensation.feed_forward=true",
+                           "controller.compensation.observer=true",
+                           "controller.compensation.inertia=true", "sensor.noise=false"};
+
+Sets with(Sets set, const Sets& more) {
+  set.insert(set.end(), more.begin(), more.end());
+  return set;
+}
+
+class Dice {
+ public:
+  explicit Dice(unsigned seed) : engine_(seed) {}
+  double between(double a, double b) {
+    return std::uniform_real_distribution<double>(a, b)(engine_);
+  }
+  int whole(int a, int b) { return std::uniform_int_distribution<int>(a, b)(engine_); }
+
+ private:
+  std::mt19937 engine_;
+};
+
+struct Ended {
+  Series series;
+  Phase phase = Phase::kDisarmed;
+  Check cause = Check::kCount;
+  bool armed = false, begun = false;  // admittance control
+};
+
+/// Lockstep but for the times: samples are read up to `jitter` [ns] before their tick and used
+/// `late` ticks after it, commands come up to `jitter` after theirs.
+Ended run(const Experiment& e, std::int64_t jitter, std::size_t late, unsigned seed) {
+  Dice dice(seed);
+  Ended out;
+  out.series.experiment = e;
+  TestPlatform platform(e.controller);
+  plant::Plant plant(e.plant);
+  TickInput in;
+  std::deque<std::pair<Sample, truth_t>> on_the_way;
+  std::int64_t command_time = 0;
+  const auto some = [&] {
+    return static_cast<std::int64_t>(dice.between(0.0, static_cast<double>(jitter)));
+  };
+  in.order.request = Request::kStart;
+  for (bool done = false; !done; ++in.tick) {
+    in.time = in.tick * e.controller.period;
+    if (in.tick > 0) plant.advance(std::max(plant.time(), in.time - some()));
+    Sample sample = plant.sample();
+    sample.command_tick = in.tick - 1;
+    sample.command_time = command_time;
+    on_the_way.emplace_back(
+        sample, toMessage(plant.truth(), header({2, 0}, sample.sequence, plant.time())));
+    if (on_the_way.size() > late + 1) on_the_way.pop_front();
+    in.sample = on_the_way.front().first;
+    const TickState& state = platform.tick(in);
+    in.order = {};
+    Row row;
+    row.t = static_cast<double>(in.time) * kSecondPerNanosecond;
+    row.state = toMessage(state, in, header({1, 0}, in.tick, in.time));
+    row.truth = on_the_way.front().second;
+    row.has_truth = true;
+    out.series.rows.push_back(row);
+    out.armed = out.armed || state.command.engaged;
+    out.begun = out.begun || state.kind == SegmentKind::kAdmittance;
+    command_time = in.time + some();
+    plant.advance(command_time);
+    plant.command(state.command);
+    done = test::done(state) || (!state.command.engaged && in.tick > 2000) || state.aborted;
+    out.phase = state.phase;
+    out.cause = state.cause;
+  }
+  return out;
+}
+
+/// fn(0) .. fn(n - 1) on two threads.
+template <class Function>
+void all(int n, const Function& fn) {
+  std::atomic<int> next = 0;
+  const auto work = [&] {
+    for (int i = next++; i < n; i = next++) fn(i);
+  };
+  std::thread other(work);
+  work();
+  other.join();
+}
+
+double at(std::vector<double> values, double share) {
+  std::sort(values.begin(), values.end());
+  return values.empty()
+             ? NAN
+             : values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
+}
+
+int emulations(int n, unsigned seed, const Sets& set) {
+  constexpr const char* kArms[] = {"unberth", "low_hover", "deploy", "capture"};
+  struct One {
+    bool earth = false;
+    int late = 0;
+    std::string ended;
+    double off = NAN;  // [-] rms over peak
+  };
+  std::vector<One> ones(static_cast<std::size_t>(n));
+  all(n, [&](int i) {
+    Dice dice(seed + static_cast<unsigned>(i));
+    One& one = ones[static_cast<std::size_t>(i)];
+    one.earth = i % 2 == 0;
+    const std::string arm = kArms[dice.whole(0, 3)];
+    const auto factor = [&] { return dice.between(0.9, 1.1); };
+    const Sets machine = {
+        fmt::format("plant_mismatch={{gain_extend: {}, gain_retract: {}, tau: {}, mass: {}, "
+                    "center: {}}}",
+                    factor(), factor(), factor(), factor(), factor()),
+        fmt::format("gravity_m_per_s2={}", one.earth ? 9.81 : 0.0), "base.keep_modes=6"};
+    one.late = dice.whole(0, 3);
+    const auto jitter = static_cast<std::int64_t>(dice.between(0.0, 2e6));
+    const Experiment e =
+        test::experiment("srms_" + arm + "_doss", with(with(kCompensated, machine), set));
+    const Ended ended = run(e, jitter, static_cast<std::size_t>(one.late), seed);
+    if (ended.phase == Phase::kParked && ended.begun) {
+      const std::optional<Emulation> found = emulation(ended.series);
+      one.off =
+          distance(found->platform, found->base).rms_position / travel(found->base).peak_position;
+    } else {
+      one.ended = fmt::format("{}: {}", ended.begun ? "stopped" : "did not begin",
+                              ended.cause == Check::kCount ? "no check" : name(ended.cause));
+    }
+  });
+  for (const bool earth : {false, true}) {
+    std::vector<double> off;
+    std::map<std::string, int> others;
+    std::map<int, std::vector<double>> by_late;
+    for (const One& one : ones) {
+      if (one.earth != earth) continue;
+      if (one.ended.empty()) {
+        off.push_back(one.off);
+        by_late[one.late].push_back(one.off);
+      } else {
+        ++others[one.ended];
+      }
+    }
+    fmt::print("{}: {} ran; rms over peak: median {:.2f} %, 90 % below {:.2f} %, worst {:.2f} %\n",
+               earth ? "on Earth" : "0 g", off.size(), 100 * at(off, 0.5), 100 * at(off, 0.9),
+               100 * at(off, 1.0));
+    for (const auto& [late, values] : by_late)
+      fmt::print("  {} ticks late: {} ran, median {:.2f} %, worst {:.2f} %\n", late, values.size(),
+                 100 * at(values, 0.5), 100 * at(values, 1.0));
+    for (const auto& [what, count] : others) fmt::print("  {} {}\n", count, what);
+  }
+  return 0;
+}
+
+int gates(int n, unsigned seed, const Sets& set) {
+  struct One {
+    bool admitted = false, grows = false;
+    std::string what;
+  };
+  std::vector<One> ones(static_cast<std::size_t>(n));
+  all(n, [&](int i) {
+    Dice dice(seed + static_cast<unsigned>(i));
+    One& one = ones[static_cast<std::size_t>(i)];
+    const double ratio = dice.between(1.0, 20.0), hertz = std::exp(dice.between(-0.7, 3.0)),
+                 zeta = dice.between(0.005, 0.05), w = 2.0 * M_PI * hertz,
+                 amplitude = std::min(0.03, 1.0 / (w * w));
+    std::vector<double> m, c, k;
+    for (int j = 0; j < 6; ++j) {
+      m.push_back((j < 3 ? 73.45 : 40.0) / ratio);
+      c.push_back(2.0 * zeta * w * m.back());
+      k.push_back(w * w * m.back());
+    }
+    const Sets base = {
+        "gravity_m_per_s2=0",
+        fmt::format(
+            "base={{mass_diagonal: [{}], damping_diagonal: [{}], stiffness_diagonal: [{}]}}",
+            fmt::join(m, ","), fmt::join(c, ","), fmt::join(k, ",")),
+        fmt::format("program=[{{move: {{}}}}, {{calibration: {{}}}}, {{move: {{to: {{x_m: {}, z_m: "
+                    "{}}}}}}}, {{admittance: {{duration_s: 15}}}}]",
+                    amplitude, 0.75 * amplitude)};
+    const Sets all_of = with(with(kCompensated, base), set);
+    Experiment asked = test::unassessed("puma_on_table_4_1", all_of);
+    one.admitted = isStable(asked.controller, asked.plant);
+
+    const Compensation& by = asked.controller.compensation;
+    const auto wrong = [&](double most) { return 1.0 + dice.between(-most, most); };
+    Experiment e = test::experiment(
+        "puma_on_table_4_1",
+        with(all_of, {fmt::format("plant_mismatch={{mass: {}}}", wrong(by.mass_error))}));
+    const double gain = wrong(by.gain_error), later = dice.between(-1.0, 1.0) * by.timing_error;
+    e.plant.actuator.gain_extend *= gain;
+    e.plant.actuator.gain_retract *= gain;
+    const double cutoff = e.plant.sensor.cutoff;
+    e.plant.sensor.cutoff = M_SQRT2 / (M_SQRT2 / cutoff + later);
+    const Ended ended = run(e, 0, 0, seed);
+    // Growth: the last third moves more than the first.
+    double first = 0.0, last = 0.0;
+    std::vector<double> moved;
+    for (const Row& row : ended.series.rows)
+      if (inAdmittance(row.state)) moved.push_back(Vec6::Map(row.state.x_dot).norm());
+    for (std::size_t j = 0; j < moved.size(); ++j) {
+      if (3 * j < moved.size()) first = std::max(first, moved[j]);
+      if (3 * j > 2 * moved.size()) last = std::max(last, moved[j]);
+    }
+    one.grows = ended.phase != Phase::kParked || !(last < 1.05 * first);
+    one.what = fmt::format(
+        "mass ratio {:.1f}, {:.2f} Hz, damping {:.3f}, gain {:.3f}, {:+.2f} ms: "
+        "{}, rate {:.2g} then {:.2g}",
+        ratio, hertz, zeta, gain, 1e3 * later, name(ended.cause), first, last);
+  });
+  int counts[2][2] = {};
+  for (const One& one : ones) {
+    ++counts[one.admitted][one.grows];
+    if (one.admitted && one.grows) fmt::print("admitted, and grows: {}\n", one.what);
+  }
+  fmt::print("admitted: {} decay, {} grow; refused: {} grow, {} decay\n", counts[1][0],
+             counts[1][1], counts[0][1], counts[0][0]);
+  return counts[1][1] == 0 ? 0 : 1;
+}
+
+}  // namespace
+}  // namespace ves
+
+int main(int argc, char** argv) {
+  const std::string what = argc > 2 ? argv[1] : "";
+  if (what != "emulation" && what != "gate") {
+    fmt::print(stderr,
+               "random_machines: want emulation or gate, a number, then seed and settings\n");
+    return 2;
+  }
+  try {
+    const int n = std::stoi(argv[2]);
+    const auto seed = static_cast<unsigned>(argc > 3 ? std::stoi(argv[3]) : 1);
+    const ves::Sets set(argv + std::min(4, argc), argv + argc);
+    return what == "gate" ? ves::gates(n, seed, set) : ves::emulations(n, seed, set);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "random_machines: {}\n", error.what());
+    return 2;
+  }
+}
