@@ -5,6 +5,7 @@
 //   random_machines emulation N [SEED [SET...]]   the DOSS on the Shuttle's arm, six modes: gains,
 //       masses, centres of mass and tau off by up to 10 %, samples 0 to 3 ticks late, read and
 //       commanded up to 2 ms before and after their ticks; half of them on Earth
+//   random_machines late N [SEED [SET...]]        the same machine as believed, N ticks late
 //   random_machines gate N [SEED [SET...]]        a PUMA on bases near the limit of stability, off
 //       by what the gate allows for: what it admits beside what then grows
 //
@@ -37,6 +38,8 @@ Sets with(Sets set, const Sets& more) {
   set.insert(set.end(), more.begin(), more.end());
   return set;
 }
+
+constexpr const char* kArms[] = {"unberth", "low_hover", "deploy", "capture"};
 
 class Dice {
  public:
@@ -121,8 +124,25 @@ double at(std::vector<double> values, double share) {
              : values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
 }
 
+double offOf(const Ended& ended) {
+  const std::optional<Emulation> found = emulation(ended.series);
+  return distance(found->platform, found->base).rms_position / travel(found->base).peak_position;
+}
+
+int late(int ticks, unsigned seed, const Sets& set) {
+  for (const char* arm : kArms) {
+    const Experiment e = test::experiment(std::string("srms_") + arm + "_doss",
+                                          with(with(kCompensated, {"base.keep_modes=6"}), set));
+    const Ended ended = run(e, 0, static_cast<std::size_t>(ticks), seed);
+    fmt::print("{}, {} ticks late: {}\n", arm, ticks,
+               ended.phase == Phase::kParked && ended.begun
+                   ? fmt::format("{:.2f} %", 100.0 * offOf(ended))
+                   : fmt::format("{} by {}", name(ended.phase), name(ended.cause)));
+  }
+  return 0;
+}
+
 int emulations(int n, unsigned seed, const Sets& set) {
-  constexpr const char* kArms[] = {"unberth", "low_hover", "deploy", "capture"};
   struct One {
     bool earth = false;
     int late = 0;
@@ -147,9 +167,7 @@ int emulations(int n, unsigned seed, const Sets& set) {
         test::experiment("srms_" + arm + "_doss", with(with(kCompensated, machine), set));
     const Ended ended = run(e, jitter, static_cast<std::size_t>(one.late), seed);
     if (ended.phase == Phase::kParked && ended.begun) {
-      const std::optional<Emulation> found = emulation(ended.series);
-      one.off =
-          distance(found->platform, found->base).rms_position / travel(found->base).peak_position;
+      one.off = offOf(ended);
     } else {
       one.ended = fmt::format("{}: {}", ended.begun ? "stopped" : "did not begin",
                               ended.cause == Check::kCount ? "no check" : name(ended.cause));
@@ -250,15 +268,16 @@ int gates(int n, unsigned seed, const Sets& set) {
 
 int main(int argc, char** argv) {
   const std::string what = argc > 2 ? argv[1] : "";
-  if (what != "emulation" && what != "gate") {
+  if (what != "emulation" && what != "gate" && what != "late") {
     fmt::print(stderr,
-               "random_machines: want emulation or gate, a number, then seed and settings\n");
+               "random_machines: want emulation, gate or late, a number, then seed and settings\n");
     return 2;
   }
   try {
     const int n = std::stoi(argv[2]);
     const auto seed = static_cast<unsigned>(argc > 3 ? std::stoi(argv[3]) : 1);
     const ves::Sets set(argv + std::min(4, argc), argv + argc);
+    if (what == "late") return ves::late(n, seed, set);
     return what == "gate" ? ves::gates(n, seed, set) : ves::emulations(n, seed, set);
   } catch (const std::exception& error) {
     fmt::print(stderr, "random_machines: {}\n", error.what());
