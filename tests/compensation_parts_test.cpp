@@ -154,6 +154,8 @@ TEST(Ahead, AHeavilyDampedModeStartsWhereItIs) {  // its way back would be longe
   model.reset(x, Mat6::Zero(), 0.02);
   model.step({}, Mat6::Zero(), 0.01, 0.02);
   EXPECT_LT((model.motion().x - x).norm(), 0.05 * x.norm());
+  const VectorXd eta = VectorXd::Constant(6, 0.1);
+  EXPECT_LT(model.energy(), 2.0 * eta.dot(m.stiffness.cwiseProduct(eta)));
 }
 
 TEST(Ahead, MotionIsThatMuchLaterUnderTheSameWrench) {
@@ -351,6 +353,20 @@ TEST(ServoObserver, RoundingIsThatOfTheReading) {
   EXPECT_LT(mean.cwiseAbs().maxCoeff(), 0.05 * scale);
 }
 
+TEST(ServoObserver, RoundingIsOfWhereTheLegsAreByThen) {
+  const Experiment e = experiment("z_sine", kAll);
+  const double scale = e.plant.transducer.scale;
+  ServoObserver observer(e.controller.servo, 0.01);
+  observer.reset(Vec6::Constant(1.5), 0);
+  observer.send(Vec6::Constant(1.51), 0, 0);
+  observer.advance(10 * kTick);
+  const double later = 0.3 * scale / observer.velocity()(0);
+  ASSERT_LT(later, 0.005);
+  const double turned =
+      (observer.rounding(Vec6::Zero(), later) - observer.rounding(Vec6::Zero(), 0.0))(0) / scale;
+  EXPECT_NEAR(turned - std::floor(turned), 0.7, 1e-6);  // 0.3 of a count less, but for whole ones
+}
+
 TEST(ServoObserver, RestsWhereItIsReset) {
   const Experiment e = experiment("z_sine", kAll);
   ServoObserver observer(e.controller.servo, 0.01);
@@ -504,6 +520,9 @@ TEST(ServoObserver, AReadingIsComparedWithTheModelAtItsOwnTime) {
   observer.correct(then.array() + more, 5 * kTick);  // half a count of it is slack
   EXPECT_LT((observer.length() - now).array().abs().maxCoeff() - 0.5 * more, 1e-12);
   EXPECT_GT((observer.length() - now).minCoeff(), 0.49 * more);
+  const Vec6 corrected = observer.length();
+  observer.correct(then.array() + more, 5 * kTick);  // it is known by now
+  EXPECT_LT((observer.length() - corrected).cwiseAbs().maxCoeff(), 1e-12);
 }
 
 }  // namespace

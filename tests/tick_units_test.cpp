@@ -83,6 +83,31 @@ TEST(SampleStream, AnOlderSampleIsNoneOnlyWhileEngaged) {
   EXPECT_TRUE(stream.fresh());
 }
 
+TEST(SampleStream, SaysWhenTheWrenchWasReadByItsOwnTime) {
+  SampleStream stream(10'000'000);
+  const auto read = [](std::int64_t sequence, std::int64_t wrench_time) {
+    Sample s = numbered(sequence);
+    s.wrench_time = wrench_time;
+    return s;
+  };
+  stream.update(read(0, 1'000'000), 3'000'000, true, false);
+  EXPECT_NEAR(stream.wrench().since, 0.010, 1e-12);  // the first: a period
+  EXPECT_NEAR(stream.wrench().age, 0.002, 1e-12);
+  stream.update(read(1, 8'500'000), 13'000'000, true, false);
+  EXPECT_NEAR(stream.wrench().since, 0.0075, 1e-12);
+  EXPECT_NEAR(stream.wrench().age, 0.0045, 1e-12);
+  stream.update(read(1, 8'500'000), 23'000'000, true, false);  // the same again
+  EXPECT_EQ(stream.wrench().since, 0.0);
+  EXPECT_NEAR(stream.wrench().age, 0.0145, 1e-12);
+  stream.update(read(2, 8'500'000), 33'000'000, true, false);  // a sample, but no new wrench
+  EXPECT_EQ(stream.wrench().since, 0.0);
+  stream.update(read(3, 33'000'000), 32'000'000, true, false);  // clocks that disagree a little
+  EXPECT_EQ(stream.wrench().age, 0.0);
+  stream.update(read(4, 600'000'000), 900'000'000, true, false);
+  EXPECT_NEAR(stream.wrench().since, 0.05, 1e-12);  // five periods are the most
+  EXPECT_NEAR(stream.wrench().age, 0.05, 1e-12);
+}
+
 TEST(SampleStream, FreshTicksCountInARowAndWithoutAConflict) {
   SampleStream stream(10'000'000);
   for (int n = 0; n < 5; ++n) stream.update(numbered(n), 0, false, false);
@@ -216,6 +241,10 @@ TEST(RobotInertia, IsMassTimesAccelerationOfAPlatformThatSlides) {
   const double mass = 52.45 + 16.0 + 5.0;  // the PUMA with link 0, adapter, top plate
   EXPECT_LT((F.f - 0.5 * mass * a).norm(), 1e-9 * mass);
   EXPECT_NEAR(inertia.M_1()(0, 0), 0.5 * mass, 1e-9);
+  config.servo.sensor_scale = 1.1;  // as an identification has found
+  const Wrench shown =
+      RobotInertia(config).update(KnownPayload(config), 0, q, P.X, legs, true, 0.5);
+  EXPECT_LT((shown.stacked() - 1.1 * F.stacked()).norm(), 1e-9 * mass);
   ControllerConfig published = puma();
   RobotInertia none(published);
   EXPECT_EQ(none.update(KnownPayload(published), 0, q, P.X, legs, true, 1.0).stacked().norm(), 0.0);
