@@ -147,7 +147,13 @@ int servo(const std::string& log, const std::string& file) {
     LegCounts sent{}, read{};
     std::copy_n(row.state.counts, kLegs, sent.begin());
     std::copy_n(row.sample.legs, kLegs, read.begin());
+    // When a command came the next sample tells.
+    if (!record.legs.sent.empty() && sample->command_tick == record.shake.tick.back())
+      record.legs.sent.back() = sample->command_time;
     record.legs.reference.push_back(legLengths(c.legs, sent));
+    record.legs.sent.push_back(row.state.machine_time_ns);
+    record.legs.read.push_back(sample->legs_time);
+    record.shake.tick.push_back(row.state.header.sequence);
     record.legs.length.push_back(legLengths(c.legs, read));
     record.shake.time.push_back(row.state.machine_time_ns);
     record.shake.reference.push_back(legLengths(c.legs, sent));

@@ -425,6 +425,9 @@ struct Recorded {
       if (!state.command.engaged) continue;
       legs.reference.push_back(legLengths(e.controller.legs, state.command.counts));
       legs.length.push_back(legLengths(e.controller.legs, loop.sample().legs));
+      legs.sent.push_back(loop.input.time);
+      legs.read.push_back(loop.sample().legs_time);
+      shake.tick.push_back(state.tick);
       shake.time.push_back(loop.input.time);
       shake.reference.push_back(legs.reference.back());
       shake.sample.push_back(loop.sample());
@@ -528,6 +531,10 @@ TEST(ServoIdentification, RefusesLegsThatStand) {
   LegRecord record;
   record.reference.assign(200, Vec6::Constant(1.5));
   record.length = record.reference;
+  for (std::int64_t n = 0; n < 200; ++n) {
+    record.sent.push_back(n * 10'000'000);
+    record.read.push_back(n * 10'000'000);
+  }
   try {
     identifyServo(e.controller.servo, 0.01, record);
     ADD_FAILURE() << "of legs that stand";

@@ -92,6 +92,22 @@ TEST(Config, EveryMachineNumberIsTheReportsOrTagged) {
     check(loadDocument(fs::path(test::configDir()) / file), "", false);
 }
 
+TEST(Config, ABaseTooFastToStepWithABodyIsRefusedOnlyWithOne) {
+  const auto load = [](const std::string& stiffness, const char* inertia) {
+    return loadExperiment(test::configDir() + "/scenarios/free_decay.yaml",
+                          {"base.stiffness_diagonal=[" + stiffness + ",2500,4000,1500,1000,2000]",
+                           "controller.compensation.observer=true",
+                           std::string("controller.compensation.inertia=") + inertia});
+  };
+  EXPECT_EQ(test::refusal([&] { load("1e9", "false"); }), "");
+  EXPECT_EQ(test::refusal([&] { load("1e8", "true"); }), "");
+  EXPECT_NE(test::refusal([&] {
+              load("1e12", "true");
+            }).find("base: with the inertia compensated its fastest mode, 4.472e+04 rad/s"),
+            std::string::npos)
+      << test::refusal([&] { load("1e12", "true"); });
+}
+
 TEST(Config, ReadingsDivideTheControllersPeriod) {
   const auto load = [](const std::string& set) {
     return loadExperiment(test::configDir() + "/scenarios/free_decay.yaml", {set});

@@ -108,6 +108,28 @@ TEST(SampleStream, SaysWhenTheWrenchWasReadByItsOwnTime) {
   EXPECT_NEAR(stream.wrench().age, 0.05, 1e-12);
 }
 
+TEST(SampleStream, AClockThatGoesBackIsStaleUntilItIsLaterThanEver) {
+  SampleStream stream(10'000'000);
+  const auto at = [](std::int64_t sequence, std::int64_t time) {
+    Sample s = numbered(sequence);
+    s.time = s.legs_time = s.wrench_time = s.joints_time = time;
+    return s;
+  };
+  stream.update(at(0, 100), 0, true, false);
+  stream.update(at(1, 3'600'000'000'000), 0, true, false);  // once, an hour ahead
+  EXPECT_TRUE(stream.fresh());
+  for (int n = 2; n < 8; ++n) {
+    stream.update(at(n, n * 10'000'000), 0, true, false);
+    EXPECT_EQ(stream.age(), n - 1);
+    EXPECT_EQ(stream.wrench().since, 0.0);
+  }
+  // While nobody is engaged a machine may begin anew.
+  stream.update(at(8, 80'000'000), 0, false, false);
+  stream.update(at(9, 70'000'000), 0, false, false);
+  stream.update(at(10, 80'000'000), 0, false, false);
+  EXPECT_TRUE(stream.fresh());
+}
+
 TEST(SampleStream, FreshTicksCountInARowAndWithoutAConflict) {
   SampleStream stream(10'000'000);
   for (int n = 0; n < 5; ++n) stream.update(numbered(n), 0, false, false);

@@ -284,7 +284,8 @@ MatrixXd systemOf(const Loop& loop, const Lifted& lifted) {
   // The command, from where the model is at its own time or, ahead, at the legs'.
   MatrixXd told = S.topRows(2 * k);
   if (own.inertia) {
-    const double age = static_cast<double>(d) * T;  // which a sample's own time tells
+    constexpr Index kMost = 5;  // [periods] that WrenchTiming tells
+    const double age = static_cast<double>(std::min(d, kMost)) * T;
     const ModalHold ahead = modalHold(base, age + wrenchDelay(own.servo, T));
     told = ahead.Phi * S.topRows(2 * k) + ahead.Gamma * u;
   }

@@ -123,6 +123,17 @@ Experiment build(const Value& document) {
   c.safety = readSafety(root.section("safety"), sensor.model.volts_per_count);
   const Base base = readBase(root.section("base"));
   c.admittance = base.modes;
+  if (c.compensation.inertia && c.admittance.stiffness.size() > 0) {
+    const double fastest = std::sqrt(c.admittance.stiffness.maxCoeff()),
+                 damping = c.admittance.damping.norm();
+    if (!((fastest + damping) * c.periodSeconds() <= kMostModalAngle))
+      root.fail(
+          "base",
+          fmt::format("with the inertia compensated its fastest mode, {:.4g} rad/s and damped "
+                      "by {:.4g}/s, takes a tick too long, want together at most {:.4g}/s; "
+                      "keep_modes leaves the softest",
+                      fastest, damping, kMostModalAngle / c.periodSeconds()));
+  }
   out.arm = base.shape;
 
   c.payload.X_PS = sensor.X_PS;

@@ -83,11 +83,12 @@ Compensation withRecord(Compensation nominal, const ServoRecord& record) {
   const auto share = [&](Vec6 ServoModel::*value) {
     return (record.deviation.*value).cwiseQuotient(record.servo.*value).maxCoeff();
   };
-  nominal.gain_error =
-      kDeviations * std::max(share(&ServoModel::extend), share(&ServoModel::retract));
-  if (!(record.deviation.sensor_scale > 0.0)) return nominal;
-  nominal.timing_error = kDeviations * record.deviation.sensor_delay;
-  nominal.mass_error = kDeviations * record.deviation.sensor_scale;
+  const auto atLeast = [](double& value, double deviation) {
+    value = std::max(value, kDeviations * deviation);
+  };
+  atLeast(nominal.gain_error, std::max(share(&ServoModel::extend), share(&ServoModel::retract)));
+  atLeast(nominal.timing_error, record.deviation.sensor_delay);
+  atLeast(nominal.mass_error, record.deviation.sensor_scale);
   return nominal;
 }
 

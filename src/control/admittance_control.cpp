@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/control/admittance_control.hpp"
 
+#include <algorithm>
+
 #include "ves/control/motion_plan.hpp"
 
 namespace ves {
@@ -16,14 +18,17 @@ AdmittanceControl::AdmittanceControl(const ControllerConfig& config)
 
 void AdmittanceControl::begin(const Vec6& x, const Mat6& M_1, double age) noexcept {
   model_.reset(x, M_1, inertia_ ? age + wrench_delay_ : 0.0);
+  begins_ = true;
   oscillation_.reset();
 }
 
 const PathPoint<6>& AdmittanceControl::step(const AdmittanceInput& in, const Vec6& last,
                                             const PathChecks& checks) noexcept {
   if (in.F_Po_I.stacked().allFinite()) {
+    const double since = begins_ ? std::min(in.wrench.since, period_) : in.wrench.since;
+    begins_ = false;
     if (inertia_)
-      model_.step(in.F_Po_I, in.M_1, in.wrench.since, in.wrench.age + in.share * wrench_delay_);
+      model_.step(in.F_Po_I, in.M_1, since, in.wrench.age + in.share * wrench_delay_);
     else
       model_.step(in.F_Po_I);
     slowInsideEnvelope(last, in.L, checks);

@@ -49,14 +49,16 @@ void StaticLoad::update(const Payload& payload, const JointVector& q, const Mat3
   const Vec6 weight = F_So_S_.stacked();
   counts_ = S_proc_ * weight;
   if (!filters_ || !weight.allFinite()) return;
-  const Vec6 before = filter_.output().matrix();
-  if (!engaged)
+  if (!engaged) {
     filter_.settle(weight.array());
-  else if (since > 0.0)
+    felt_ = weight;
+  } else if (since > 0.0) {
+    const Vec6 before = filter_.output().matrix();
     filter_.advance(filter_.prepare(since), weight.array());
-  Vec6 felt = filter_.output().matrix();
-  if (averages_ && engaged) felt = 0.5 * (before + felt).eval();
-  F_So_S_ = Wrench::from(weight + share * (felt - weight));
+    felt_ = filter_.output().matrix();
+    if (averages_) felt_ = 0.5 * (before + felt_).eval();
+  }
+  F_So_S_ = Wrench::from(weight + share * (felt_ - weight));
 }
 
 RobotInertia::RobotInertia(const ControllerConfig& config)

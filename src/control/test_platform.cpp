@@ -36,6 +36,7 @@ const TickState& TestPlatform::tick(const TickInput& in) noexcept {
   const bool engaged = commander_.command().engaged;
   const bool following = engaged && !supervisor_.stopped();
   const Elapsed& elapsed = clock_.update(in.tick);
+  time_ = in.time;
   samples_.update(in.sample, in.time, engaged, in.conflicting_node);
   if (following) share_.advance();
   const Sample& sample = samples_.sample();
@@ -113,7 +114,7 @@ Tripped TestPlatform::safetyChecks(const Proposal& next, const Wrench& dynamic,
 void TestPlatform::legCommunication(const Proposal& next) noexcept {
   motion_.commit(next.x, lead() > 0.0);
   commander_.command(next.legs, !supervisor_.disarmed(), supervisor_.segment(), lead(),
-                     share_.value(), legs_.servo(), samples_.wrench().age);
+                     share_.value(), legs_.servo(), legs_.age(time_));
 }
 
 /// [s] after this tick for which a command is meant: the admittance model determines the next

@@ -135,8 +135,8 @@ std::string netFtXml(const NetFtCalibration& calibration, int records_per_second
       records_per_second);
 }
 
-RdtStream::RdtStream(const NetFtCalibration& c, const Mat6& S_proc, std::int64_t window) noexcept
-    : window_(window) {
+RdtStream::RdtStream(const NetFtCalibration& c, const Mat6& S_proc, std::int64_t window)
+    : window_(window), taken_(8192) {
   Vec6 per_count;
   per_count << Vec3::Constant(1.0 / c.counts_per_newton),
       Vec3::Constant(1.0 / c.counts_per_newton_metre);

@@ -31,7 +31,7 @@ Wrenches wrenchesOf(const ControllerConfig& c, const ShakeRecord& record) {
     servo.arrived(s.command_tick, s.command_time);
     servo.advance(std::max(s.legs_time, s.wrench_time));
     servo.correct(L, s.legs_time);
-    servo.send(record.reference[n], static_cast<std::int64_t>(n), record.time[n]);
+    servo.send(record.reference[n], record.tick[n], record.time[n]);
 
     const ForwardSolution forward = forwardPose(c.geometry, L, X_IP);
     BodyMotion P;
@@ -130,8 +130,11 @@ SensorEstimate identifySensor(const ControllerConfig& c, const ShakeRecord& reco
   out.scale_deviation = std::sqrt(kJackknife * scale_squares);
   out.delay_deviation = std::sqrt(kJackknife * delay_squares);
   constexpr double kMostDeviation = 2e-3, kMostScale = 0.2;  // [s], [-]
+  constexpr double kMostDelay = 0.01, kLargest = 2.0;        // [s], [-] as ServoRecord takes them
   if (!(out.delay_deviation < kMostDeviation && out.scale_deviation < kMostScale))
     throw std::domain_error("the platform moves too little to tell the wrench's time");
+  if (!(std::abs(out.delay) <= kMostDelay && out.scale <= kLargest && out.scale >= 1.0 / kLargest))
+    throw std::domain_error("it is far from what is believed of filter and robot");
   return out;
 }
 

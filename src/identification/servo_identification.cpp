@@ -16,14 +16,12 @@ constexpr std::array<Vec6 ServoModel::*, 4> kParameters = {
 /// Lengths that the model foretells, the first reading given.
 std::vector<Vec6> foretold(const ServoModel& servo, double period, double phase,
                            const LegRecord& record) {
-  const std::int64_t tick = std::llround(period * 1e9);  // [ns]
   ServoObserver model(servo, period, phase);
-  model.reset(record.length.front(), 0);
+  model.reset(record.length.front(), record.read.front());
   std::vector<Vec6> out = {record.length.front()};
   for (std::size_t n = 0; n + 1 < record.length.size(); ++n) {
-    const auto now = static_cast<std::int64_t>(n);
-    model.send(record.reference[n], now, now * tick);
-    model.advance((now + 1) * tick);
+    model.send(record.reference[n], static_cast<std::int64_t>(n), record.sent[n]);
+    model.advance(record.read[n + 1]);
     out.push_back(model.length());
   }
   return out;

@@ -69,10 +69,12 @@ sample_t MachineProcess::publish(std::int64_t answers) {
     bus_.publish(channel::kTruth,
                  toMessage(plant().truth(), header(self_, sample.sequence, sample.time)));
   sample_t message = toMessage(sample, self_, answers);
-  const PlantLink::Heard& heard = link_.lastHeard();
-  message.command_source = heard.source;
-  message.command_sequence = heard.sequence;
-  message.command_time_ns = heard.time;
+  if (!options_.lockstep) {  // there a command comes at its tick, by the simulated clock
+    const PlantLink::Heard& heard = link_.lastHeard();
+    message.command_source = heard.source;
+    message.command_sequence = heard.sequence;
+    message.command_time_ns = heard.time;
+  }
   bus_.publish(channel::kSample, message);
   return message;
 }

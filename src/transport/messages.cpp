@@ -74,6 +74,11 @@ sample_t toMessage(const Sample& sample, const Identity& from, std::int64_t answ
   m.wrench_time_ns = sample.wrench_time;
   m.joints_time_ns = sample.joints_time;
   m.faults = static_cast<std::int32_t>(sample.faults);
+  if (sample.command_source != 0) {
+    m.command_source = sample.command_source;
+    m.command_sequence = sample.command_tick;
+    m.command_time_ns = sample.command_time;
+  }
   return m;
 }
 
@@ -292,6 +297,7 @@ std::optional<Sample> fromMessage(const sample_t& m) noexcept {
   s.joints_time = stamp(m.joints_time_ns);
   s.faults = static_cast<std::uint32_t>(m.faults);
   if (m.command_source != 0) {
+    s.command_source = m.command_source;
     s.command_tick = m.command_sequence;
     s.command_time = m.command_time_ns;
   }

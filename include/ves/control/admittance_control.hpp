@@ -47,6 +47,7 @@ class AdmittanceControl {
   AdmittanceModel model_;
   bool inertia_;         // compensated
   double wrench_delay_;  // [s]
+  bool begins_ = true;   // the first step: what was before it does not count
   Oscillation oscillation_;
   double period_;        // [s]
   double joint_moves_;   // [rad | m] what counts as a motion of the robot

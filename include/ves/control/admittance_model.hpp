@@ -8,6 +8,9 @@
 
 namespace ves {
 
+/// [rad] that a base's fastest mode may pass in a period where a body moves with it: the work of a
+/// tick grows with it (ModalDynamics::advance).
+inline constexpr double kMostModalAngle = 20.0;
 /// Degrees of freedom of the report's SRMS model.
 inline constexpr int kMaxModes = 132;
 /// Modes that may be coupled by damping.
@@ -90,7 +93,7 @@ class ModalDynamics {
 
  private:
   Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, kMaxModes> Phi_;
-  Mat6 compliance_;      // Phi Phi^T: acceleration per wrench
+  Mat6 compliance_;                            // Phi Phi^T: acceleration per wrench
   Vector<kMaxModes> k_;                        // [1/s^2]
   Vector<kMaxModes> c_;                        // [1/s] diagonal of the damping
   double fastest_ = 0.0, most_damping_ = 0.0;  // [rad/s], [1/s]

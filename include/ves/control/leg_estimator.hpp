@@ -32,6 +32,11 @@ class LegEstimator {
   const LegReadings& readings() const noexcept { return readings_; }
   const Vec6& recentSpeed() const noexcept { return speed_.speed(); }  // [m/s] as commanded
   const ServoObserver& servo() const noexcept { return servo_; }
+  /// [s] that its model is behind `time` [ns]; five periods at most.
+  double age(std::int64_t time) const noexcept {
+    const double age = static_cast<double>(time - servo_.time()) * kSecondPerNanosecond;
+    return std::clamp(age, 0.0, 5.0 * period_);
+  }
   /// Measured lengths, and rates and accelerations by the servo model as the sample's wrench shows
   /// them.
   const LegMotion& feltMotion() const noexcept { return felt_; }

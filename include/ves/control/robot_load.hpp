@@ -61,6 +61,7 @@ class StaticLoad {
   Butterworth2<6> filter_;  // the sensor's
   bool averages_;           // the sensor's readings, over about the time between two of its samples
   Vec6 counts_ = Vec6::Zero();
+  Vec6 felt_ = Vec6::Zero();  // [N, N m] as the newest wrench shows it
   Wrench F_So_S_;
 };
 

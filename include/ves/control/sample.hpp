@@ -38,7 +38,8 @@ struct Sample {
   std::uint32_t switches = 0;           // bits of Switch
   double temperature = 20.0;            // [C] of the laboratory, by a thermometer beside the sensor
   std::uint32_t faults = 0;             // bits of Piece
-  std::int64_t command_tick = -1;       // [-] of the last command that came; -1: not said
+  std::int64_t command_source = 0;      // [-] who sent the last command that came; 0: not said
+  std::int64_t command_tick = -1;       // [-] its tick
   std::int64_t command_time = 0;        // [ns] the machine's clock when it came
 
   /// [ns] of the piece that is oldest, when the sample was put together.

@@ -82,6 +82,7 @@ class ServoObserver {
   /// What the transducers read at `time`, now or before.
   void correct(const Vec6& L, std::int64_t time) noexcept;
 
+  std::int64_t time() const noexcept { return now_; }   // [ns] where it is
   const Vec6& length() const noexcept { return L_; }    // [m]
   const Vec6& velocity() const noexcept { return v_; }  // [m/s]
   /// [m] what the LegSlaves' readings will be too long, on average over a period that begins

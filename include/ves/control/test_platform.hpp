@@ -51,7 +51,8 @@ class TestPlatform {
   const TickState& report(const Wrenches& W) noexcept;
 
   ControllerConfig config_;
-  double period_;  // [s]
+  double period_;          // [s]
+  std::int64_t time_ = 0;  // [ns] of this tick, by the machine's clock
   TickClock clock_;
   SampleStream samples_;
   CompensationShare share_;

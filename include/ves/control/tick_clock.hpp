@@ -59,7 +59,11 @@ class SampleStream {
     if (!(engaged && newest.sequence < before.sequence)) sample_ = newest;
     age_before_ = age_;
     const bool first = before.sequence < 0;
-    const bool newer = sample_.sequence > before.sequence && (sample_.time > before.time || first);
+    // A clock that went back is stale until it is later than it has ever been.
+    if (!engaged && (newest.sequence < before.sequence || newest.time < before.time))
+      latest_ = INT64_MIN;
+    const bool newer = sample_.sequence > before.sequence && sample_.time > latest_;
+    if (newer) latest_ = sample_.time;
     age_ = newer ? 0 : age_ + 1;
     fresh_ticks_ = fresh() && !conflict ? fresh_ticks_ + 1 : 0;
     const auto seconds = [this](std::int64_t time) {
@@ -67,7 +71,7 @@ class SampleStream {
       return static_cast<double>(std::clamp<std::int64_t>(time, 0, kMostPeriods * period_)) *
              kSecondPerNanosecond;
     };
-    wrench_ = {seconds(first ? period_ : sample_.wrench_time - before.wrench_time),
+    wrench_ = {!newer ? 0.0 : seconds(first ? period_ : sample_.wrench_time - before.wrench_time),
                seconds(now - sample_.wrench_time)};
   }
   /// The count of fresh ticks begins anew.
@@ -83,6 +87,7 @@ class SampleStream {
  private:
   std::int64_t period_;  // [ns]
   Sample sample_;
+  std::int64_t latest_ = INT64_MIN;  // [ns] time of the newest so far
   WrenchTiming wrench_;
   int age_ = 0, age_before_ = 0;
   int fresh_ticks_ = 0;

@@ -10,6 +10,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "ves/devices/devices.hpp"
 
@@ -54,7 +55,7 @@ class RdtStream {
  public:
   /// `S_proc` [count/N | count/(N m)] turns a wrench into those counts, (2.6). `window` [ns] before
   /// the newest record is averaged; 0: that one alone.
-  RdtStream(const NetFtCalibration& calibration, const Mat6& S_proc, std::int64_t window) noexcept;
+  RdtStream(const NetFtCalibration& calibration, const Mat6& S_proc, std::int64_t window);
 
   struct Counters {
     std::int64_t records = 0;    // [-] taken
@@ -81,8 +82,8 @@ class RdtStream {
     RdtRecord record;
     std::int64_t time = 0;  // [ns]
   };
-  std::array<Taken, 256> taken_{};  // a ring: 36 ms of 7000 a second
-  std::size_t count_ = 0;           // [-] so far
+  std::vector<Taken> taken_;  // a ring: more than a second of 7000
+  std::size_t count_ = 0;     // [-] so far
   const Taken& newest(std::size_t back = 0) const noexcept {
     return taken_[(count_ - 1 - back) % taken_.size()];
   }

@@ -12,7 +12,8 @@ namespace ves {
 
 /// Ticks without a gap.
 struct ShakeRecord {
-  std::vector<std::int64_t> time;  // [ns] of the machine's clock, when the tick began
+  std::vector<std::int64_t> tick;  // [-]
+  std::vector<std::int64_t> time;  // [ns] of the machine's clock, when it began
   std::vector<Vec6> reference;     // [m] sent then
   std::vector<Sample> sample;      // used then
   std::vector<Vec6> bias;          // [count] of the sensor

@@ -11,8 +11,10 @@ namespace ves {
 
 /// What the legs were told and what they did, a tick each, without gaps.
 struct LegRecord {
-  std::vector<Vec6> reference;  // [m] sent in this tick
-  std::vector<Vec6> length;     // [m] read in this tick, before that
+  std::vector<Vec6> reference;     // [m] sent in this tick
+  std::vector<std::int64_t> sent;  // [ns] of the machine's clock when it came there
+  std::vector<Vec6> length;        // [m] used in this tick
+  std::vector<std::int64_t> read;  // [ns] when it was read
 };
 
 struct ServoEstimate {
