@@ -144,19 +144,19 @@ int servo(const std::string& log, const std::string& file) {
     if (!usable || row.state.header.sequence != last + 1) record = {};
     last = row.state.header.sequence;
     if (!usable) continue;
-    LegCounts sent{}, read{};
+    LegCounts sent{};
     std::copy_n(row.state.counts, kLegs, sent.begin());
-    std::copy_n(row.sample.legs, kLegs, read.begin());
+    const Vec6 reference = legLengths(c.legs, sent);
     // When a command came the next sample tells.
     if (!record.legs.sent.empty() && sample->command_tick == record.shake.tick.back())
       record.legs.sent.back() = sample->command_time;
-    record.legs.reference.push_back(legLengths(c.legs, sent));
+    record.legs.reference.push_back(reference);
     record.legs.sent.push_back(row.state.machine_time_ns);
+    record.legs.length.push_back(legLengths(c.legs, sample->legs));
     record.legs.read.push_back(sample->legs_time);
     record.shake.tick.push_back(row.state.header.sequence);
-    record.legs.length.push_back(legLengths(c.legs, read));
     record.shake.time.push_back(row.state.machine_time_ns);
-    record.shake.reference.push_back(legLengths(c.legs, sent));
+    record.shake.reference.push_back(reference);
     record.shake.sample.push_back(*sample);
     record.shake.bias.push_back(Vec6::Map(row.state.bias));
     if (record.legs.length.size() > longest.legs.length.size()) longest = record;

@@ -44,8 +44,7 @@ int showLoop(const Experiment& e) {
     const auto least = [](bool most) { return most ? "at least " : ""; };
     fmt::print(
         "stable, legs {}: where it is worst, bears {}{:.0f} % of the robot's inertia, {}{:.0f} % "
-        "of "
-        "the servos' gain, a wrench {}{:.2f} ms earlier or {}{:.2f} ms later than believed, and "
+        "of the servos' gain, a wrench {}{:.2f} ms earlier or {}{:.2f} ms later than believed, and "
         "{}{} ticks of further delay\n",
         extending ? "extending" : "retracting", least(m.gain >= Margins::kMostGain), 100.0 * m.gain,
         least(m.servo_gain >= Margins::kMostGain), 100.0 * m.servo_gain,

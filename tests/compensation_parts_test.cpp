@@ -31,13 +31,15 @@ Experiment experiment(const std::string& name, const std::vector<std::string>& s
 
 // The base with a body on it
 
-ModalModel base(int k) {
+/// Damped in proportion, or by a damper that couples the modes too.
+ModalModel base(int k, bool coupled = false) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> u(-1.0, 1.0);
   ModalModel m;
   m.Phi = MatrixXd::NullaryExpr(6, k, [&] { return 0.05 * u(random); });
   m.stiffness = VectorXd::LinSpaced(k, 10.0, 900.0);
   m.damping = (0.04 * m.stiffness.cwiseSqrt()).asDiagonal();
+  if (coupled) m.damping += 0.3 * MatrixXd::Ones(k, k);
   return m;
 }
 
@@ -68,8 +70,7 @@ TEST(BodyOnTheBase, MovesAsTheAugmentedModalMassSays) {  // (3.11), to rounding
   std::mt19937 random(5);
   std::uniform_real_distribution<double> u(-50.0, 50.0);
   for (const bool coupled : {false, true}) {
-    ModalModel m = base(6);
-    if (coupled) m.damping += 0.3 * MatrixXd::Ones(6, 6);
+    const ModalModel m = base(6, coupled);
     AdmittanceModel model(m, 0.01);
     model.reset(Vec6::Zero());
     VectorXd z = VectorXd::Zero(12);
@@ -131,8 +132,7 @@ TEST(BodyOnTheBase, LosesNoEnergyThatTheBaseDoesNot) {  // undamped: for minutes
 TEST(Ahead, AFreeRunIsThatFromRestWhereItWasReset) {  // with the body on the base
   constexpr double kAhead = 0.02;
   for (const bool coupled : {false, true}) {
-    ModalModel m = base(6);
-    if (coupled) m.damping += 0.3 * MatrixXd::Ones(6, 6);
+    const ModalModel m = base(6, coupled);
     AdmittanceModel model(m, 0.01);
     VectorXd z = VectorXd::Zero(12);
     z.head(6) = VectorXd::LinSpaced(6, 0.1, -0.2);
@@ -160,8 +160,7 @@ TEST(Ahead, AHeavilyDampedModeStartsWhereItIs) {  // its way back would be longe
 
 TEST(Ahead, MotionIsThatMuchLaterUnderTheSameWrench) {
   for (const bool coupled : {false, true}) {
-    ModalModel m = base(6);
-    if (coupled) m.damping += 0.3 * MatrixXd::Ones(6, 6);
+    const ModalModel m = base(6, coupled);
     AdmittanceModel model(m, 0.01);
     model.reset(Vec6::Zero());
     VectorXd z = VectorXd::Zero(12);

@@ -11,26 +11,21 @@
 namespace ves {
 namespace {
 
+template <class T>
 struct Key {
   const char* name;
-  Vec6 ServoModel::*value;
+  T ServoModel::*value;
   double lo, hi;
   const char* what;
 };
-constexpr Key kKeys[] = {
+constexpr Key<Vec6> kKeys[] = {
     {"extend_per_s", &ServoModel::extend, 0.1, 1e3, "velocity gain, extending"},
     {"retract_per_s", &ServoModel::retract, 0.1, 1e3, "and retracting"},
     {"tau_s", &ServoModel::tau, 1e-4, 1.0, "of the cylinder"},
     {"delay_s", &ServoModel::delay, -0.01, 0.1, "from a tick to the LegSlave"}};
 
 /// Of the force-torque sensor; files of earlier versions have none.
-struct SensorKey {
-  const char* name;
-  double ServoModel::*value;
-  double lo, hi;
-  const char* what;
-};
-constexpr SensorKey kSensorKeys[] = {
+constexpr Key<double> kSensorKeys[] = {
     {"sensor_delay_s", &ServoModel::sensor_delay, -0.01, 0.01, "of the wrench, beyond its filter"},
     {"sensor_scale", &ServoModel::sensor_scale, 0.5, 2.0, "of the robot's inertia that it shows"}};
 
@@ -44,11 +39,11 @@ std::string write(const ServoRecord& r) {
   const auto line = [&](const std::string& name, const Vec6& v, const std::string& what) {
     text += fmt::format("{}: [{}]{}\n", name, fmt::join(v.data(), v.data() + v.size(), ", "), what);
   };
-  for (const Key& key : kKeys) {
+  for (const Key<Vec6>& key : kKeys) {
     line(key.name, r.servo.*key.value, fmt::format("  # {}", key.what));
     line(fmt::format("{}_deviation", key.name), r.deviation.*key.value, "");
   }
-  for (const SensorKey& key : kSensorKeys)
+  for (const Key<double>& key : kSensorKeys)
     if (r.deviation.*key.value > 0.0)
       text += fmt::format("{0}: {1}  # {2}\n{0}_deviation: {3}\n", key.name, r.servo.*key.value,
                           key.what, r.deviation.*key.value);
@@ -58,11 +53,11 @@ std::string write(const ServoRecord& r) {
 ServoRecord readServo(Section s) {
   ServoRecord r;
   r.date = readDate(s);
-  for (const Key& key : kKeys) {
+  for (const Key<Vec6>& key : kKeys) {
     r.servo.*key.value = s.vector(key.name, kLegs, key.lo, key.hi);
     r.deviation.*key.value = s.vector(fmt::format("{}_deviation", key.name), kLegs, 0.0, 1e3);
   }
-  for (const SensorKey& key : kSensorKeys) {
+  for (const Key<double>& key : kSensorKeys) {
     r.deviation.*key.value = 0.0;
     if (!s.has(key.name)) continue;
     r.servo.*key.value = s.number(key.name, key.lo, key.hi);
@@ -73,8 +68,8 @@ ServoRecord readServo(Section s) {
 }
 
 ServoModel withRecord(ServoModel nominal, const ServoRecord& record) {
-  for (const Key& key : kKeys) nominal.*key.value = record.servo.*key.value;
-  for (const SensorKey& key : kSensorKeys) nominal.*key.value = record.servo.*key.value;
+  for (const Key<Vec6>& key : kKeys) nominal.*key.value = record.servo.*key.value;
+  for (const Key<double>& key : kSensorKeys) nominal.*key.value = record.servo.*key.value;
   return nominal;
 }
 

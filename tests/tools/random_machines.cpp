@@ -13,7 +13,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <atomic>
 #include <deque>
@@ -24,7 +23,6 @@
 #include "support/rig.hpp"
 #include "ves/analysis/gate.hpp"
 #include "ves/results/comparison.hpp"
-#include "ves/run/run.hpp"
 
 namespace ves {
 namespace {
@@ -57,7 +55,7 @@ struct Ended {
   Series series;
   Phase phase = Phase::kDisarmed;
   Check cause = Check::kCount;
-  bool armed = false, begun = false;  // admittance control
+  bool begun = false;  // admittance control
 };
 
 /// Lockstep but for the times: samples are read up to `jitter` [ns] before their tick and used
@@ -93,7 +91,6 @@ Ended run(const Experiment& e, std::int64_t jitter, std::size_t late, unsigned s
     row.truth = on_the_way.front().second;
     row.has_truth = true;
     out.series.rows.push_back(row);
-    out.armed = out.armed || state.command.engaged;
     out.begun = out.begun || state.kind == SegmentKind::kAdmittance;
     command_time = in.time + some();
     plant.advance(command_time);
@@ -165,7 +162,8 @@ int emulations(int n, unsigned seed, const Sets& set) {
     const auto jitter = static_cast<std::int64_t>(dice.between(0.0, 2e6));
     const Experiment e =
         test::experiment("srms_" + arm + "_doss", with(with(kCompensated, machine), set));
-    const Ended ended = run(e, jitter, static_cast<std::size_t>(one.late), seed);
+    const Ended ended =
+        run(e, jitter, static_cast<std::size_t>(one.late), seed + static_cast<unsigned>(i));
     if (ended.phase == Phase::kParked && ended.begun) {
       one.off = offOf(ended);
     } else {
