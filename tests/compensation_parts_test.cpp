@@ -8,6 +8,7 @@
 #include <Eigen/LU>
 #include <random>
 
+#include "support/leg.hpp"
 #include "support/poses.hpp"
 #include "support/rig.hpp"
 #include "ves/math/dense.hpp"
@@ -18,6 +19,7 @@ namespace {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using test::Leg;
 
 constexpr std::int64_t kTick = 10'000'000;  // [ns]
 
@@ -220,31 +222,6 @@ TEST(ModalHold, CouplingDampingBesideStiffModesKeepsItsDigits) {
 }
 
 // The servo
-
-/// One leg of the machine: LegSlave, valve, cylinder, counts, as the plant runs them.
-struct Leg {
-  explicit Leg(const plant::PlantConfig& p, double L)
-      : config(p), actuator(p.actuator, L), slave(p.leg_slave, p.transducer.count(L)) {}
-
-  void run(std::int32_t reference, double time) {
-    const double to = now + time;
-    while (next_reading <= to) {
-      pass(next_reading - now);
-      slave.read(config.transducer.count(actuator.length()), reference);
-      next_reading += 341e-6;
-    }
-    pass(to - now);
-  }
-  void pass(double dt) {
-    actuator.advance(slave.current(), dt, std::exp(-dt / config.actuator.tau));
-    now += dt;
-  }
-
-  plant::PlantConfig config;
-  plant::Actuator actuator;
-  plant::LegSlave slave;
-  double now = 0.0, next_reading = 150e-6;
-};
 
 TEST(FeedForward, LegFollowsASineWithoutItsLag) {  // both directions; published: 18 and 27 percent
   const Experiment e = experiment("z_sine", kAll);

@@ -209,6 +209,103 @@ TEST_F(Emulation, MassRatioOfFiveMovesAsItShouldUpToTwelveHertz) {  // Appendix 
   }
 }
 
+const std::vector<std::string> kAdapts = {"controller.compensation.adaptation=true"};
+const std::vector<std::string> kAided = {"controller.compensation.wrench=aided"};
+
+TEST_F(Emulation, GainsThatAreFivePercentOffAreLearnt) {
+  for (const char* gains :
+       {"{gain_extend: 1.05, gain_retract: 1.05}", "{gain_extend: 0.95, gain_retract: 0.95}",
+        "{gain_extend: 1.05, gain_retract: 0.95}", "{}"}) {
+    const std::vector<std::string> set =
+        with(with({"sensor.noise=false", "base.keep_modes=6"}, kMean),
+             {std::string("plant_mismatch=") + gains});
+    const Experiment e = assessed("srms_capture_doss", with(kAll, kAdapts), set);
+    EXPECT_EQ(e.controller.stability, Stability::kStable);
+    const Series series = run(e);
+    ASSERT_TRUE(result_.good());
+    EXPECT_LT(share(e, series), 0.007) << gains;
+  }
+}
+
+TEST_F(Emulation, GateHoldsForAllThatMayBeLearnt) {
+  const Experiment e = experiment("srms_unberth_doss", with(kAll, kAdapts),
+                                  with({"sensor.noise=false", "base.keep_modes=6"}, kMean));
+  const Compensation& c = e.controller.compensation;
+  const double most = 1.0 + c.adaptation_limit;  // what was learnt here, the machine there
+  EXPECT_TRUE(isStable(e.controller, e.plant));
+  Experiment limit = e;
+  limit.controller.compensation.adaptation_limit = 2.0;
+  EXPECT_FALSE(isStable(limit.controller, limit.plant));
+  limit.controller.compensation.adaptation = false;
+  EXPECT_TRUE(isStable(limit.controller, limit.plant));
+  // The same by the machine itself, held as far from the belief as that: nothing grows.
+  for (const double by : {-most, most}) {
+    Experiment off = e;
+    off.controller.compensation.adaptation = false;
+    off.plant.actuator.gain_extend *= 1.0 + by * c.gain_error;
+    off.plant.actuator.gain_retract *= 1.0 + by * c.gain_error;
+    off.plant.sensor.cutoff = M_SQRT2 / (M_SQRT2 / off.plant.sensor.cutoff + by * c.timing_error);
+    const Series series = run(off);
+    ASSERT_TRUE(result_.good()) << by;
+    double first = 0.0, last = 0.0;  // rates in the seconds after the arm has moved, and at the end
+    std::vector<double> rates;
+    for (const Row& row : series.rows)
+      if (inAdmittance(row.state)) rates.push_back(Vec6::Map(row.state.x_dot).norm());
+    for (std::size_t i = 600; i < rates.size(); ++i) {
+      if (i < 1000) first = std::max(first, rates[i]);
+      if (i + 400 >= rates.size()) last = std::max(last, rates[i]);
+    }
+    EXPECT_LE(last, first) << by;
+  }
+}
+
+TEST_F(Emulation, AnAidedWrenchKeepsTheNoiseOut) {  // of the sensor, in motions of a millimetre
+  for (const char* configuration : {"unberth", "low_hover", "deploy", "capture"}) {
+    const Experiment e = experiment(std::string("srms_") + configuration + "_puma",
+                                    with(kAll, kAided), with({"base.keep_modes=6"}, kMean));
+    const Series series = run(e);
+    ASSERT_TRUE(result_.good()) << configuration;
+    EXPECT_LT(share(e, series), 0.05) << configuration;
+  }
+}
+
+TEST_F(Emulation, AnAidedWrenchLetsAPushThatNoModelKnowsPass) {
+  // 20 N for 0.1 s in z: what it does with noise and aid, beside what it does without either.
+  const auto pushed = [&](const std::vector<std::string>& more, bool push) {
+    const double counts = 20.0 * 0.17115e-6 * 10.0 * 1000.0 * 32768.0 / 10.0;  // ves.yaml, sensor
+    const std::string faults =
+        push ? ", faults: [{at_s: 2, duration_s: 0.1, fault: wrench_step, which: 3, counts: " +
+                   std::to_string(counts) + "}]"
+             : "";
+    const Series series = run(experiment("srms_low_hover_puma", with(kAll, more),
+                                         with({"base.keep_modes=6",
+                                               "program=[{move: {}}, {calibration: {}}, "
+                                               "{admittance: {duration_s: 8}" +
+                                                   faults + "}]"},
+                                              kMean)));
+    EXPECT_TRUE(result_.good());
+    std::vector<Vec6> x;
+    for (const Row& row : series.rows)
+      if (inAdmittance(row.state)) x.push_back(Vec6::Map(row.state.x_desired));
+    return x;
+  };
+  const auto effect = [&](const std::vector<std::string>& more) {
+    std::vector<Vec6> with_push = pushed(more, true), without = pushed(more, false);
+    for (std::size_t i = 0; i < std::min(with_push.size(), without.size()); ++i)
+      with_push[i] -= without[i];
+    return with_push;
+  };
+  const std::vector<Vec6> should = effect({"sensor.noise=false"}), is = effect(kAided);
+  ASSERT_EQ(should.size(), is.size());
+  double both = 0.0, all = 0.0;
+  for (std::size_t i = 0; i < is.size(); ++i) {
+    both += is[i](2) * should[i](2);
+    all += should[i](2) * should[i](2);
+  }
+  EXPECT_GT(both, 0.95 * all);
+  EXPECT_LT(both, 1.05 * all);
+}
+
 TEST_F(Emulation, LoopModelKnowsTheCompensation) {
   // Growth that the linear loop foresees, against the whole machine, where the controller believes
   // another mass, or another servo gain, than there is.

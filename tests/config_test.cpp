@@ -57,6 +57,8 @@ TEST(Config, EveryMachineNumberIsTheReportsOrTagged) {
                                         "feed_forward",
                                         "observer",
                                         "inertia",
+                                        "adaptation",
+                                        "wrench",
                                         "filters",
                                         "legs",
                                         "force_sensor",
@@ -125,6 +127,28 @@ TEST(Config, ReadingsDivideTheControllersPeriod) {
             std::string::npos);
   EXPECT_NE(test::refusal([&] { load("sensor.readings_per_tick=0"); }).find("want"),
             std::string::npos);
+}
+
+TEST(Config, APlantMismatchChangesTheMachineAndNotWhatTheControllerBelieves) {
+  const auto load = [](const std::string& set) {
+    return loadExperiment(test::configDir() + "/scenarios/puma_tilt.yaml", {set});
+  };
+  const Experiment right = load("seed=1");
+  const Experiment off = load(
+      "plant_mismatch={gain_extend: 1.1, gain_retract: 0.9, tau: 1.2, mass: 1.05, center: 1.3, "
+      "sensor_cutoff: 0.95}");
+  EXPECT_DOUBLE_EQ(off.plant.actuator.gain_extend, 1.1 * right.plant.actuator.gain_extend);
+  EXPECT_DOUBLE_EQ(off.plant.actuator.gain_retract, 0.9 * right.plant.actuator.gain_retract);
+  EXPECT_DOUBLE_EQ(off.plant.actuator.tau, 1.2 * right.plant.actuator.tau);
+  EXPECT_DOUBLE_EQ(off.plant.sensor.cutoff, 0.95 * right.plant.sensor.cutoff);
+  const RigidBody &heavy = off.plant.payload.robot.link(1).body,
+                  &link = right.plant.payload.robot.link(1).body;
+  EXPECT_DOUBLE_EQ(heavy.mass, 1.05 * link.mass);
+  EXPECT_LT((heavy.p_BoBcm_B - 1.3 * link.p_BoBcm_B).norm(), 1e-12);
+  EXPECT_EQ(off.controller.payload, right.controller.payload);
+  EXPECT_EQ(off.controller.servo.extend, right.controller.servo.extend);
+  EXPECT_EQ(off.controller.servo.tau, right.controller.servo.tau);
+  EXPECT_EQ(off.controller.servo.sensor_cutoff, right.controller.servo.sensor_cutoff);
 }
 
 TEST(Config, AnotherBaseReplacesTheMachinesOwn) {
@@ -250,6 +274,14 @@ INSTANTIATE_TEST_SUITE_P(
             "positive semidefinite"},
         Bad{"choice", "z_sine", "legs.filters=all",
             "legs.filters: 'all', want one of none, outputs"},
+        Bad{"inertia_without_observer", "z_sine", "controller.compensation.inertia=true",
+            "controller.compensation.inertia: needs the observer, want 'observer: true'"},
+        Bad{"adaptation_without_observer", "z_sine", "controller.compensation.adaptation=true",
+            "controller.compensation.adaptation: needs the observer, want 'observer: true'"},
+        Bad{"aided_without_inertia", "z_sine", "controller.compensation.wrench=aided",
+            "'aided' needs the robot's inertia taken out, want 'inertia: true'"},
+        Bad{"wrench_choice", "z_sine", "controller.compensation.wrench=clean",
+            "controller.compensation.wrench: 'clean', want one of raw, aided"},
         Bad{"flag", "z_sine", "sensor.noise=yes", "sensor.noise: 'yes', want one of true, false"},
         Bad{"stroke_outside_transducer", "z_sine", "legs.offset_m=1.3", "14-bit transducer"},
         Bad{"initial_pose_out_of_reach", "z_sine", "initial_pose.z_m=0.9",

@@ -58,6 +58,25 @@ TEST_F(Replay, RepeatsEveryStateAndCommand) {
   EXPECT_EQ(r.phase, Phase::kParked);
 }
 
+TEST_F(Replay, RepeatsARunWithEverythingBeyondTheReport) {  // with times that are not the tick's
+  const Experiment e = experiment(
+      "srms_capture_doss",
+      {"controller.compensation.feed_forward=true", "controller.compensation.observer=true",
+       "controller.compensation.inertia=true", "controller.compensation.adaptation=true",
+       "controller.compensation.wrench=aided", "sensor.readings_per_tick=4",
+       "program=[{move: {}, faults: [{at_s: 0, duration_s: 100, fault: samples_late, samples: 2}]},"
+       " {calibration: {}}, {admittance: {duration_s: 3}, robot: [{at_s: 0, duration_s: 2, joint: "
+       "joint_3, to_deg_or_m: -30}]}]"});
+  {
+    LogWriter writer(log_);
+    runLockstep(e, &writer, nullptr);
+  }
+  const ReplayResult r = replay(log_, {}, nullptr);
+  EXPECT_GT(r.ticks, 500);
+  EXPECT_EQ(r.different, 0);
+  EXPECT_EQ(r.phase, Phase::kParked);
+}
+
 TEST_F(Replay, OneFlippedBitInASampleIsFoundInItsTick) {
   for (std::int64_t tick : {300, 700, 1500}) {
     copy([&](LogEvent& event) {

@@ -94,7 +94,9 @@ bool holds(const ControllerConfig& controller, const plant::PlantConfig& plant,
 }
 
 Uncertainty uncertaintyOf(const Compensation& c) {
-  return {c.timing_error, c.gain_error, c.mass_error};
+  // What was learnt may be as far on the other side of the belief as it is allowed to go.
+  const double servos = c.adaptation ? 1.0 + c.adaptation_limit : 1.0;
+  return {servos * c.timing_error, servos * c.gain_error, c.mass_error};
 }
 
 /// Of the eight corners of what the belief may be off by, one where the loop grows.

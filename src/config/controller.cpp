@@ -29,6 +29,16 @@ Compensation readCompensation(Section& controller) {
   c.mass_update = static_cast<int>(s.integer("mass_update_ticks", 1, 1'000'000));
   c.ramp = s.number("ramp_s", 0.01, 100.0);
   c.jitter = s.number("reading_jitter_s", 0.0, 0.1);
+  c.adaptation = s.flag("adaptation");
+  if (c.adaptation && !c.observer)
+    s.fail("adaptation", "needs the observer, want 'observer: true'");
+  c.adaptation_limit = s.number("adaptation_limit", 0.0, 10.0);
+  c.forgetting = s.number("forgetting_s", 1.0, 1e6);
+  c.aided = s.choice("wrench", {"raw", "aided"}) == "aided";
+  if (c.aided && !c.inertia)
+    s.fail("wrench", "'aided' needs the robot's inertia taken out, want 'inertia: true'");
+  c.gate = s.number("gate_deviations", 0.0, 100.0);
+  c.gate_hold = s.number("gate_hold_s", 0.0, 100.0);
   c.timing_error = s.number("timing_error_s", 0.0, 0.005);
   c.gain_error = s.number("gain_error", 0.0, 0.5);
   c.mass_error = s.number("mass_error", 0.0, 0.5);

@@ -102,6 +102,7 @@ void readPlantMismatch(Section s, plant::PlantConfig& p) {
   factor("gain_extend", p.actuator.gain_extend);
   factor("gain_retract", p.actuator.gain_retract);
   factor("tau", p.actuator.tau);
+  factor("sensor_cutoff", p.sensor.cutoff);
   const double mass = s.has("mass") ? s.number("mass", 0.01, 100.0) : 1.0;
   const double center = s.has("center") ? s.number("center", 0.0, 10.0) : 1.0;
   const auto change = [&](RigidBody& body) {

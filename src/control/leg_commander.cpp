@@ -5,7 +5,6 @@ namespace ves {
 
 LegCommander::LegCommander(const ControllerConfig& config)
     : codec_(config.legs),
-      servo_(config.servo),
       compensation_(config.compensation),
       period_(config.periodSeconds()),
       leg_min_(config.safety.leg_min),
@@ -41,7 +40,7 @@ Vec6 LegCommander::referenceOf(const LegMotion& legs, double lead, double share,
                                const ServoObserver& servo, double age) const noexcept {
   if (!compensation_.any()) return legs.L;
   Vec6 L = legs.L;
-  if (compensation_.feed_forward) L = feedForward(servo_, legs, lead, period_, share);
+  if (compensation_.feed_forward) L = feedForward(servo.model(), legs, lead, period_, share);
   if (compensation_.observer && command_.engaged) L += share * servo.rounding(legs.L_dot, age);
   return L.cwiseMax(leg_min_).cwiseMin(leg_max_);
 }

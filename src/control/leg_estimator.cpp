@@ -11,7 +11,12 @@ LegEstimator::LegEstimator(const ControllerConfig& config)
       period_(config.periodSeconds()),
       reading_jump_(config.safety.reading_jump),
       observes_(config.compensation.observer),
-      servo_(config.servo, period_) {
+      adapts_(config.compensation.adaptation),
+      servo_(config.servo, period_),
+      adaptation_(config.servo,
+                  {config.compensation.gain_error, config.compensation.timing_error,
+                   config.compensation.adaptation_limit, config.compensation.forgetting},
+                  period_) {
   measured_.X_IP = geometry_.fromHome({});
 }
 
@@ -27,10 +32,12 @@ const Measured& LegEstimator::update(const SampleStream& samples, const Elapsed&
   const Sample& sample = samples.sample();
   if (!following) {
     servo_.reset(measured_.L, sample.time);
+    adaptation_.reset(measured_.L, sample.time);
   } else if (observes_ && samples.fresh()) {
     servo_.arrived(sample.command_tick, sample.command_time);
     servo_.advance(std::max(sample.legs_time, sample.wrench_time));
     servo_.correct(measured_.L, sample.legs_time);
+    if (adapts_) adapt(sample);
   }
   if (observes_)
     felt_ = {measured_.L, servo_.velocity(), servo_.filteredAcceleration(sample.wrench_time)};
@@ -42,8 +49,18 @@ const Measured& LegEstimator::update(const SampleStream& samples, const Elapsed&
   return measured_;
 }
 
+void LegEstimator::adapt(const Sample& sample) noexcept {
+  adaptation_.arrived(sample.command_tick, sample.command_time);
+  if (!readings_.taken()) return;
+  adaptation_.learn(measured_.L, sample.legs_time);
+  servo_.use(adaptation_.gains());
+}
+
 void LegEstimator::sent(const LegCounts& counts, std::int64_t tick, std::int64_t time) noexcept {
-  if (observes_) servo_.send(legLengths(codec_, counts), tick, time);
+  if (!observes_) return;
+  const Vec6 reference = legLengths(codec_, counts);
+  servo_.send(reference, tick, time);
+  adaptation_.send(reference, tick, time);
 }
 
 }  // namespace ves

@@ -28,6 +28,7 @@ TestPlatform::TestPlatform(const ControllerConfig& config)
       load_(config),
       bias_(config),
       robot_(config),
+      aided_(config),
       motion_(config),
       safety_(config.safety, config.geometry, period_),
       commander_(config) {}
@@ -53,7 +54,10 @@ const TickState& TestPlatform::tick(const TickInput& in) noexcept {
   W.static_wrench = gravityCompensation(config_.payload, X_IP.R, load_.wrench());  // (B.4)
   W.inertial = robot_.update(known_, elapsed.count, sample.q, X_IP, legs_.feltMotion(), engaged,
                              share_.value());
-  W.dynamic = W.total - W.static_wrench + W.inertial;
+  const Wrench measured = W.total - W.static_wrench + W.inertial;
+  W.dynamic = aided_.update(
+      {measured, W.static_wrench, robot_.M_1(), known_, samples_, bias_, X_IP, share_.value()},
+      engaged);
   safety_.watch(elapsed, samples_, load_.counts());
 
   const Situation now{config_,
@@ -145,6 +149,8 @@ const TickState& TestPlatform::report(const Wrenches& W) noexcept {
   state_.total = W.total;
   state_.static_wrench = W.static_wrench;
   state_.inertial = W.inertial;
+  state_.reaction = aided_.reaction();
+  state_.withholds = aided_.withholds();
   state_.dynamic = W.dynamic;
   state_.compensation_share = share_.value();
   state_.motion = motion_.motion();
@@ -153,6 +159,7 @@ const TickState& TestPlatform::report(const Wrenches& W) noexcept {
   state_.legs = commander_.legs();
   state_.reference = commander_.reference();
   state_.command = commander_.command();
+  state_.servo = legs_.gains();
   state_.L_measured = legs_.measured().L;
   state_.measured = legs_.measured().pose;
   state_.bias = bias_.counts();

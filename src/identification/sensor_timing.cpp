@@ -6,7 +6,7 @@
 #include <stdexcept>
 
 #include "ves/control/gravity_compensation.hpp"
-#include "ves/control/servo.hpp"
+#include "ves/control/servo_observer.hpp"
 
 namespace ves {
 namespace {

@@ -16,7 +16,7 @@ constexpr std::array<Vec6 ServoModel::*, 4> kParameters = {
 /// Lengths that the model foretells, the first reading given.
 std::vector<Vec6> foretold(const ServoModel& servo, double period, double phase,
                            const LegRecord& record) {
-  ServoObserver model(servo, period, phase);
+  ModelledServos model(servo, period, phase);
   model.reset(record.length.front(), record.read.front());
   std::vector<Vec6> out = {record.length.front()};
   for (std::size_t n = 0; n + 1 < record.length.size(); ++n) {

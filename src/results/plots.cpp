@@ -244,6 +244,25 @@ std::vector<std::filesystem::path> drawPlots(const Series& series,
           true}});
   finish("legs.png", legs);
 
+  if (experiment.controller.compensation.adaptation) {
+    const ServoModel& believed = experiment.controller.servo;
+    Page page(series, marks, "servos.png", experiment.name + ": what is learnt of the servos",
+              program, 1, 3);
+    const auto panel = [&](const std::string& ylabel, const char* what, double scale,
+                           const Vec6& belief) {
+      std::vector<Curve> curves;
+      for (int i = 0; i < kLegs; ++i)
+        curves.push_back({[value = column(fmt::format("leg{}_{}", i + 1, what)), scale,
+                           off = belief(i)](const Row& row) { return scale * (value(row) - off); },
+                          fmt::format("leg {}", i + 1), kColour[i % 3], i >= 3});
+      page.panel(ylabel, curves);
+    };
+    panel("gain, extending, beyond belief [1/s]", "gain_extend_per_s", 1.0, believed.extend);
+    panel("gain, retracting, beyond belief [1/s]", "gain_retract_per_s", 1.0, believed.retract);
+    panel("delay, beyond belief [ms]", "servo_delay_s", 1e3, believed.delay);
+    finish("servos.png", page);
+  }
+
   if (tool && !tool->tick.empty()) {
     Page page(series, marks, "tool.png", experiment.name + ": the tool, carried by the base",
               program, 1, 2);

@@ -196,11 +196,17 @@ std::vector<Column> columns(const Experiment& experiment) {
   addWrench("total", &state_t::total);
   addWrench("static", &state_t::static_wrench);
   addWrench("inertial", &state_t::inertial);
+  if (experiment.controller.compensation.aided) addWrench("reaction", &state_t::reaction);
   addWrench("dynamic", &state_t::dynamic);
   addLegs("commanded", "m", &state_t::leg);
   addLegs("commanded_rate", "m_per_s", &state_t::leg_dot);
   addLegs("commanded_acceleration", "m_per_s2", &state_t::leg_ddot);
   addLegs("reference", "m", &state_t::reference);
+  if (experiment.controller.compensation.adaptation) {
+    addLegs("gain_extend", "per_s", &state_t::gain_extend);
+    addLegs("gain_retract", "per_s", &state_t::gain_retract);
+    addLegs("servo_delay", "s", &state_t::servo_delay);
+  }
   addLegs("measured", "m", &state_t::leg_measured);
   for (int i = 0; i < static_cast<int>(experiment.robot.joint_names.size()); ++i)
     add(fmt::format("{}_{}", experiment.robot.joint_names[static_cast<std::size_t>(i)],

@@ -112,6 +112,8 @@ state_t toMessage(const TickState& state, const TickInput& in, const header_t& h
   put(state.total.stacked(), m.total);
   put(state.static_wrench.stacked(), m.static_wrench);
   put(state.inertial.stacked(), m.inertial);
+  put(state.reaction.stacked(), m.reaction);
+  m.withholds = state.withholds ? 1 : 0;
   put(state.dynamic.stacked(), m.dynamic);
   put(state.motion.x, m.x);
   put(state.motion.x_dot, m.x_dot);
@@ -122,6 +124,9 @@ state_t toMessage(const TickState& state, const TickInput& in, const header_t& h
   put(state.legs.L_ddot, m.leg_ddot);
   m.compensation_share = state.compensation_share;
   put(state.reference, m.reference);
+  put(state.servo.extend, m.gain_extend);
+  put(state.servo.retract, m.gain_retract);
+  put(state.servo.delay, m.servo_delay);
   put(state.L_measured, m.leg_measured);
   put(state.measured.stacked(), m.x_measured);
   put(state.bias, m.bias);

@@ -234,8 +234,15 @@ const std::vector<std::string> kCompensated = {
     "controller.compensation.feed_forward=true", "controller.compensation.observer=true",
     "controller.compensation.inertia=true", "sensor.readings_per_tick=4"};
 void ControllerTickCompensated(benchmark::State& state) { tick(state, kCompensated); }
+void ControllerTickLearningAided(benchmark::State& state) {
+  std::vector<std::string> set = kCompensated;
+  set.insert(set.end(),
+             {"controller.compensation.adaptation=true", "controller.compensation.wrench=aided"});
+  tick(state, set);
+}
 BENCHMARK(ControllerTick);
 BENCHMARK(ControllerTickCompensated);
+BENCHMARK(ControllerTickLearningAided);
 
 /// Each tick by itself, in the closed loop: median and 99.9th percentile, the clock's reading
 /// included.

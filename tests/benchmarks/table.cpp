@@ -122,6 +122,7 @@ std::vector<Ratio> ratios(const Json& results) {
        ns("KdlFixedBasePuma") / ns("NewtonEulerMovingBasePuma"), ">= 2.5"},
       {"controller tick [us]", 1e-3 * ns("ControllerTick"), "<= 8"},
       {"  with compensation [us]", 1e-3 * ns("ControllerTickCompensated"), "<= 8"},
+      {"  and adaptation, aided wrench [us]", 1e-3 * ns("ControllerTickLearningAided"), ""},
       {"  99.9th percentile over median", counter("ControllerTickTail", "p999_over_median"),
        "<= 3"},
       {"lockstep, times real time", counter("LockstepDemo", "x_real_time"), ">= 500"},

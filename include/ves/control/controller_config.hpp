@@ -13,14 +13,20 @@
 
 namespace ves {
 
-/// What goes beyond the report (control/servo.hpp); all off: as published.
+/// What goes beyond the report (docs/compensation.md); all off: as published.
 struct Compensation {
-  bool feed_forward = false;  // the servos' lag taken out of the reference
-  bool observer = false;      // the servo model beside the servos: lengths below a count
-  bool inertia = false;       // the robot's inertia taken out of the wrench, and into the base
-  int mass_update = 1;        // [-] ticks for which the robot's composite body is kept
-  double ramp = 0.5;          // [s] over which they come in, and go out
-  double jitter = 0.0;        // [s] by which the time of a leg's reading may be wrong
+  bool feed_forward = false;       // the servos' lag taken out of the reference
+  bool observer = false;           // the servo model beside the servos: lengths below a count
+  bool inertia = false;            // the robot's inertia taken out of the wrench, and into the base
+  int mass_update = 1;             // [-] ticks for which the robot's composite body is kept
+  double ramp = 0.5;               // [s] over which they come in, and go out
+  double jitter = 0.0;             // [s] by which the time of a leg's reading may be wrong
+  bool adaptation = false;         // the servos' gains and delay learnt while things run
+  double adaptation_limit = 1.25;  // [-] times gain_error and timing_error, how far they may go
+  double forgetting = 60.0;        // [s] of motion that counts for them, to 1/e
+  bool aided = false;              // sensor noise kept out by the robot's model
+  double gate = 4.5;               // [-] deviations of the noise that a residual has to be above
+  double gate_hold = 0.1;          // [s] for which it passes then
   // What the belief may be wrong by, for which the loop has to decay (analysis/gate.hpp).
   double timing_error = 0.0;  // [s] of the wrench
   double gain_error = 0.0;    // [-] of the servos

@@ -7,6 +7,7 @@
 #include <algorithm>
 
 #include "ves/control/controller_config.hpp"
+#include "ves/control/servo_observer.hpp"
 
 namespace ves {
 
@@ -60,7 +61,6 @@ class LegCommander {
                    double age) const noexcept;
 
   LegCodec codec_;
-  ServoModel servo_;
   Compensation compensation_;
   double period_;             // [s]
   double leg_min_, leg_max_;  // [m]

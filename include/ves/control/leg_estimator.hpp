@@ -6,6 +6,7 @@
 
 #include "ves/control/leg_commander.hpp"
 #include "ves/control/monitors.hpp"
+#include "ves/control/servo_adaptation.hpp"
 #include "ves/control/tick_clock.hpp"
 
 namespace ves {
@@ -32,6 +33,7 @@ class LegEstimator {
   const LegReadings& readings() const noexcept { return readings_; }
   const Vec6& recentSpeed() const noexcept { return speed_.speed(); }  // [m/s] as commanded
   const ServoObserver& servo() const noexcept { return servo_; }
+  const ServoGains& gains() const noexcept { return adaptation_.gains(); }  // in use
   /// [s] that its model is behind `time` [ns]; five periods at most.
   double age(std::int64_t time) const noexcept {
     const double age = static_cast<double>(time - servo_.time()) * kSecondPerNanosecond;
@@ -42,12 +44,15 @@ class LegEstimator {
   const LegMotion& feltMotion() const noexcept { return felt_; }
 
  private:
+  void adapt(const Sample& sample) noexcept;
+
   Geometry geometry_;
   LegCodec codec_;
   double period_;        // [s]
   double reading_jump_;  // [m] of a leg at rest, from one sample to the next
-  bool observes_;
+  bool observes_, adapts_;
   ServoObserver servo_;
+  ServoAdaptation adaptation_;
   LegReadings readings_;
   LegSpeed speed_;
   Measured measured_;

@@ -53,6 +53,7 @@ class SensorBias {
 
   const Vec6& counts() const noexcept { return bias_; }  // [count]
   const Calibration& calibration() const noexcept { return calibration_; }
+  bool calibrated() const noexcept { return calibrated_; }  // once at least
   /// Of the last calibration that succeeded. [count]
   const Vec6& deviation() const noexcept { return deviation_; }
   const Vec6& standardError() const noexcept { return standard_error_; }
@@ -61,6 +62,7 @@ class SensorBias {
   Tare tare_;
   Calibration calibration_;
   Vec6 bias_;
+  bool calibrated_ = false;
   Vec6 deviation_ = Vec6::Zero(), standard_error_ = Vec6::Zero();
 };
 

@@ -22,7 +22,7 @@
 // ones.
 #pragma once
 
-#include "ves/control/robot_load.hpp"
+#include "ves/control/aided_wrench.hpp"
 #include "ves/control/safety_monitor.hpp"
 #include "ves/control/supervisor.hpp"
 
@@ -41,7 +41,7 @@ class TestPlatform {
     Wrench total;          // measured
     Wrench static_wrench;  // of gravity
     Wrench inertial;       // of the robot's composite body, when that is compensated
-    Wrench dynamic;        // total - static_wrench + inertial
+    Wrench dynamic;        // total - static_wrench + inertial, less what passes for noise
   };
   PathPoint<6> nextMotion(const Wrench& dynamic) noexcept;
   Tripped safetyChecks(const Proposal& next, const Wrench& dynamic, bool conflict) const noexcept;
@@ -61,6 +61,7 @@ class TestPlatform {
   StaticLoad load_;
   SensorBias bias_;
   RobotInertia robot_;
+  AidedWrench aided_;
   MotionGenerator motion_;
   SafetyMonitor safety_;
   Supervisor supervisor_;

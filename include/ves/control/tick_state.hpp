@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "ves/control/force_measurement.hpp"
+#include "ves/control/modelled_servos.hpp"
 #include "ves/control/program.hpp"
 #include "ves/control/safety_checks.hpp"
 #include "ves/control/sample.hpp"
@@ -49,13 +50,16 @@ struct TickState {
   std::int32_t age = 0;                    // [-] ticks since the sample was new
   Wrench total;                            // F_Po_I measured
   Wrench static_wrench;                    // of gravity, the report's static wrench
-  Wrench inertial;  // of the robot's composite body, when that is compensated
-  Wrench dynamic;   // total - static_wrench + inertial: the admittance model's input
+  Wrench inertial;         // of the robot's composite body, when that is compensated
+  Wrench reaction;         // of its joints in motion, modelled, when the wrench is aided
+  bool withholds = false;  // of total - static_wrench + inertial what differs from it, as noise
+  Wrench dynamic;          // the rest: the admittance model's input
   double compensation_share = 0.0;  // [-] of the compensation that is in
   PathPoint<6> motion;              // commanded coordinates about home, rates, accelerations
   Vec6 desired = Vec6::Zero();      // coordinates that the platform should have at this very tick
   LegMotion legs;                   // commanded
   Vec6 reference = Vec6::Zero();    // [m] what the servos are told, so that the legs go there
+  ServoGains servo;                 // of the servo model in use
   Vec6 L_measured = Vec6::Zero();   // [m]
   Pose measured;                    // about home, from L_measured
   Vec6 bias = Vec6::Zero();         // [count]

@@ -5,7 +5,7 @@
 
 #include <vector>
 
-#include "ves/control/servo.hpp"
+#include "ves/control/modelled_servos.hpp"
 
 namespace ves {
 

@@ -11,8 +11,8 @@
 
 namespace ves {
 
-/// Draws pose.png, error.png, wrench.png, legs.png and, where the robot has a tool and a base to
-/// move on, tool.png with gnuplot; returns those that exist now.
+/// Draws with gnuplot pose.png, error.png, wrench.png, legs.png; servos.png where the servos are
+/// learnt; tool.png where the robot has a tool and a base to move on. Returns those that exist now.
 std::vector<std::filesystem::path> drawPlots(const Series& series,
                                              const std::optional<ToolMotion>& tool,
                                              const std::filesystem::path& folder);

@@ -38,6 +38,8 @@ void forEachField(const state_t& m, F f) {
   f("total", m.total);
   f("static_wrench", m.static_wrench);
   f("inertial", m.inertial);
+  f("reaction", m.reaction);
+  f("withholds", m.withholds);
   f("dynamic", m.dynamic);
   f("x", m.x);
   f("x_dot", m.x_dot);
@@ -48,6 +50,9 @@ void forEachField(const state_t& m, F f) {
   f("leg_ddot", m.leg_ddot);
   f("compensation_share", m.compensation_share);
   f("reference", m.reference);
+  f("gain_extend", m.gain_extend);
+  f("gain_retract", m.gain_retract);
+  f("servo_delay", m.servo_delay);
   f("leg_measured", m.leg_measured);
   f("x_measured", m.x_measured);
   f("bias", m.bias);

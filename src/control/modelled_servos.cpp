@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/control/modelled_servos.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ves {
+
+ModelledServos::ModelledServos(const ServoModel& servo, double period, double phase)
+    : servo_(servo),
+      period_(std::llround(period * 1e9)),
+      to_update_(phase * servo.update),
+      whole_(passage(servo.update)) {}
+
+ModelledServos::Passage ModelledServos::passage(double dt) const noexcept {
+  return {dt, (-dt / servo_.tau.array()).exp()};
+}
+
+void ModelledServos::reset(const Vec6& L, std::int64_t time) noexcept {
+  L_ = L;
+  v_.setZero();
+  v_end_.setZero();
+  E_.setZero();
+  now_ = time;
+  sent_ = 0;
+  send(L, -1, time - period_);
+}
+
+void ModelledServos::send(const Vec6& reference, std::int64_t tick, std::int64_t time) noexcept {
+  commands_[sent_++ % kCommands] = {tick, time, reference};
+}
+
+void ModelledServos::arrived(std::int64_t tick, std::int64_t time) noexcept {
+  constexpr std::int64_t kMostPeriods = 5;  // [-] on the way; what says more is not about ours
+  for (std::size_t i = 1; i <= std::min(sent_, kCommands); ++i) {
+    Command& command = commands_[(sent_ - i) % kCommands];
+    if (command.tick != tick) continue;
+    if (std::abs(time - command.time) < kMostPeriods * period_) command.time = time;
+    return;
+  }
+}
+
+void ModelledServos::use(const ServoGains& gains) noexcept {
+  servo_.extend = gains.extend;
+  servo_.retract = gains.retract;
+  servo_.delay = gains.delay;
+}
+
+/// [m] of the newest command that has taken effect.
+double ModelledServos::reference(int leg) const noexcept {
+  const auto delay = std::llround(servo_.delay(leg) * 1e9);
+  const std::size_t known = std::min(sent_, kCommands);
+  for (std::size_t i = 1; i < known; ++i) {
+    const Command& command = commands_[(sent_ - i) % kCommands];
+    if (command.time + delay <= now_) return command.reference(leg);
+  }
+  return commands_[(sent_ - known) % kCommands].reference(leg);
+}
+
+/// All LegSlaves compare.
+void ModelledServos::update() noexcept {
+  for (int i = 0; i < kLegs; ++i) {
+    const double X = reading(i, L_(i), v_(i));
+    E_(i) = std::clamp(reference(i) - X - servo_.derivative * v_(i), -servo_.rail, servo_.rail);
+    v_end_(i) = (E_(i) > 0.0 ? servo_.extend(i) : servo_.retract(i)) * E_(i);
+  }
+}
+
+/// Returns the mean acceleration.
+ModelledServos::Channels ModelledServos::pass(const Passage& passage) noexcept {
+  const Channels excess = v_.array() - v_end_.array();
+  const Channels v = v_end_.array() + excess * passage.decay;
+  L_.array() += v_end_.array() * passage.dt + excess * servo_.tau.array() * (1.0 - passage.decay);
+  const Channels acceleration = (v - v_.array()) / passage.dt;
+  v_ = v.matrix();
+  return acceleration;
+}
+
+double ModelledServos::reading(int leg, double L, double v) const noexcept {
+  const double offset = servo_.readings.offset(leg), scale = servo_.readings.scale(leg);
+  const auto count = [&](double length) { return std::floor((length - offset) / scale + 0.5); };
+  return offset + 0.5 * scale * (count(L) + count(L - 2.0 * servo_.reading_age * v));
+}
+
+}  // namespace ves

@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// The modelled reaction of the joints, and what of a residual is let pass.
+#include "ves/control/aided_wrench.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <random>
+
+#include "support/rig.hpp"
+
+namespace ves {
+namespace {
+
+constexpr std::int64_t kTick = 10'000'000;  // [ns]
+const std::vector<std::string> kAided = {
+    "controller.compensation.feed_forward=true", "controller.compensation.observer=true",
+    "controller.compensation.inertia=true", "controller.compensation.wrench=aided"};
+
+ControllerConfig config(const std::vector<std::string>& more = {}) {
+  std::vector<std::string> set = kAided;
+  set.insert(set.end(), more.begin(), more.end());
+  return test::experiment("puma_on_table_4_1", set).controller;
+}
+
+// The reaction of the joints
+
+constexpr double kMass = 12.0, kReach = 0.7, kInertia = 0.9;  // [kg], [m], [kg m^2] about z
+constexpr double kSwing = 0.6, kRate = 2.0 * M_PI * 0.8;      // [rad], [rad/s]
+const Vec3 kAxle(0.2, -0.1, 0.5);                             // [m] in P
+
+/// One link that turns about z at kAxle.
+ControllerConfig pendulum(ControllerConfig c) {
+  Payload& payload = c.payload;
+  payload = {};
+  payload.X_PR.p = kAxle;
+  payload.robot.size = payload.robot.joints = 1;
+  Link& link = payload.robot.links[0];
+  link.body.mass = kMass;
+  link.body.p_BoBcm_B = {kReach, 0.0, 0.0};
+  link.body.I_Bcm_B = Vec3(0.1, kInertia, kInertia).asDiagonal();
+  return c;
+}
+
+double angle(double t) { return kSwing * std::sin(kRate * t); }
+
+/// F_Po_P on the platform, written out: a mass on a circle, and what turns it.
+Vec6 reaction(double t) {
+  const double q = angle(t), rate = kSwing * kRate * std::cos(kRate * t),
+               acceleration = -kRate * kRate * q;
+  const Vec3 radial(std::cos(q), std::sin(q), 0.0), tangent(-std::sin(q), std::cos(q), 0.0);
+  const Vec3 f = -kMass * kReach * (acceleration * tangent - rate * rate * radial);
+  const Vec3 n = (kAxle + kReach * radial).cross(f) - kInertia * acceleration * Vec3::UnitZ();
+  return (Vec6() << f, n).finished();
+}
+
+/// Behind w^2 / (s^2 + sqrt(2) w s + w^2) by small Runge-Kutta steps, averaged over `window` [s] up
+/// to `until`.
+Vec6 filtered(double w, double until, double window) {
+  constexpr double h = 1e-4;
+  Vec6 y = Vec6::Zero(), v = Vec6::Zero(), sum = Vec6::Zero();
+  int n = 0;
+  const auto a = [&](double t, const Vec6& y_, const Vec6& v_) -> Vec6 {
+    return w * w * (reaction(t) - y_) - M_SQRT2 * w * v_;
+  };
+  for (int k = 0; k * h < until - 0.5 * h; ++k) {
+    const double t = k * h;
+    const Vec6 k1 = a(t, y, v), v2 = v + 0.5 * h * k1, k2 = a(t + 0.5 * h, y + 0.5 * h * v, v2),
+               v3 = v + 0.5 * h * k2, k3 = a(t + 0.5 * h, y + 0.5 * h * v2, v3), v4 = v + h * k3,
+               k4 = a(t + h, y + h * v3, v4);
+    const Vec6 before = y;
+    y += h / 6.0 * (v + 2.0 * v2 + 2.0 * v3 + v4);
+    v += h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4);
+    if (t > until - window - 0.5 * h) sum += 0.5 * (before + y), ++n;
+  }
+  return n > 0 ? Vec6(sum / n) : y;
+}
+
+TEST(JointReaction, IsWhatTheSensorShowsOfALinkThatSwings) {
+  for (const bool averaged : {false, true}) {
+    const ControllerConfig c =
+        pendulum(config({averaged ? "sensor.readings_per_tick=4" : "sensor.readings_per_tick=1"}));
+    KnownPayload known(c);
+    JointReaction joints(c);
+    Vec6 most = Vec6::Zero(), off = Vec6::Zero();
+    for (int k = 0; k <= 150; ++k) {
+      Sample s;
+      s.time = s.wrench_time = s.joints_time = k * kTick;
+      s.q(0) = angle(1e-2 * k);
+      const Vec6 F = joints.update(known, s).stacked();
+      if (k < 50 || k % 5 != 0) continue;
+      const Vec6 should = filtered(c.servo.sensor_cutoff, 1e-2 * k, averaged ? 1e-2 : 0.0);
+      most = most.cwiseMax(should.cwiseAbs());
+      off = off.cwiseMax((F - should).cwiseAbs());
+    }
+    for (int i = 0; i < 6; ++i) EXPECT_LE(off(i), 0.005 * most(i) + 1e-9) << i << averaged;
+  }
+}
+
+TEST(JointReaction, KnowsSamplesThatComeUnevenlyAndAWrenchThatIsOlder) {
+  const ControllerConfig c = pendulum(config());
+  KnownPayload known(c);
+  JointReaction joints(c);
+  std::mt19937 random(5);
+  std::uniform_int_distribution<std::int64_t> jitter(-2'000'000, 2'000'000);
+  double off = 0.0, most = 0.0;
+  for (int k = 1; k <= 200; ++k) {
+    Sample s;
+    s.time = s.joints_time = k * kTick + jitter(random);
+    s.wrench_time = s.joints_time - 4'000'000;
+    s.q(0) = angle(1e-9 * static_cast<double>(s.joints_time));
+    const double F = joints.update(known, s).f(1);
+    if (k < 50 || k % 10 != 0) continue;
+    const double should =
+        filtered(c.servo.sensor_cutoff, 1e-9 * static_cast<double>(s.wrench_time), 0.0)(1);
+    off = std::max(off, std::abs(F - should));
+    most = std::max(most, std::abs(should));
+  }
+  EXPECT_LT(off, 0.01 * most);
+}
+
+TEST(JointReaction, JointsThatStandGiveNoneAndAPauseBeginsAnew) {
+  const ControllerConfig c = pendulum(config());
+  KnownPayload known(c);
+  JointReaction joints(c);
+  for (int k = 0; k < 20; ++k) {
+    Sample s;
+    s.wrench_time = s.joints_time = k * kTick;
+    s.q(0) = 0.7;
+    EXPECT_EQ(joints.update(known, s).stacked(), Vec6(Vec6::Zero()));
+  }
+  joints.reset();
+  for (int k = 0; k < 2; ++k) {  // where it was before the pause is no speed
+    Sample s;
+    s.wrench_time = s.joints_time = (500 + k) * kTick;
+    s.q(0) = -0.7 + 0.1 * k;
+    EXPECT_EQ(joints.update(known, s).stacked(), Vec6(Vec6::Zero()));
+  }
+}
+
+// The gate
+
+/// [count] deviations of 5, the mean of a calibration independent samples' mean.
+ResidualNoise noiseOfFive() {
+  ResidualNoise n;
+  n.once.setConstant(25.0);
+  n.mean.setConstant(25.0 / kCalibrationSamples);
+  return n;
+}
+
+TEST(ResidualGate, NoiseStaysOutside) {
+  const ControllerConfig c = config();
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal(0.0, 5.0);
+  ResidualGate gate(c);
+  int open = 0;
+  constexpr int kSamples = 20'000;
+  for (int k = 0; k < kSamples; ++k)
+    open += gate.open(Vec6::NullaryExpr([&] { return normal(random); }), noiseOfFive());
+  // 6.8e-6 a channel, sample and mean, open for ten samples each.
+  EXPECT_LE(open, 120);
+}
+
+TEST(ResidualGate, OpensAtOnceForWhatIsLargeAndLaterForWhatIsSmall) {
+  const ControllerConfig c = config();
+  const auto samplesUntilOpen = [&](double residual, int channel) {
+    ResidualGate gate(c);
+    for (int k = 0; k < 50; ++k) gate.open(Vec6::Zero(), noiseOfFive());
+    for (int k = 1; k <= 500; ++k)
+      if (gate.open(residual * Vec6::Unit(channel), noiseOfFive())) return k;
+    return 0;
+  };
+  // Bounds: 4.5 * sqrt(25 / n + 25 / 100) for means of n.
+  EXPECT_EQ(samplesUntilOpen(22.7, 0), 1);
+  EXPECT_EQ(samplesUntilOpen(-22.7, 5), 1);
+  EXPECT_EQ(samplesUntilOpen(22.5, 0), 3);  // 10.31 of five
+  EXPECT_EQ(samplesUntilOpen(10.4, 2), 5);
+  EXPECT_EQ(samplesUntilOpen(10.2, 2), 20);  // 3.90 of fifty: 19.1 samples
+  EXPECT_EQ(samplesUntilOpen(3.95, 3), 50);
+  EXPECT_EQ(samplesUntilOpen(3.85, 3), 0);
+}
+
+TEST(ResidualGate, StaysOpenForATenthOfASecond) {
+  ResidualGate gate(config());
+  EXPECT_TRUE(gate.open(40.0 * Vec6::Unit(1), noiseOfFive()));  // the means see nothing of it
+  int open = 0;
+  while (gate.open(Vec6::Zero(), noiseOfFive()) && open < 100) ++open;
+  EXPECT_EQ(open, 9);  // and the tenth is the sample itself
+}
+
+TEST(ResidualGate, ANumberThatIsNonePasses) {  // so that the safety checks see it
+  ResidualGate gate(config());
+  Vec6 residual = Vec6::Zero();
+  residual(4) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_TRUE(gate.open(residual, noiseOfFive()));
+}
+
+TEST(ResidualGate, AllowsForTheLegsAndTheWeight) {
+  const ControllerConfig c = config();
+  const auto passes = [&](double residual, const ResidualNoise& noise) {
+    ResidualGate gate(c);
+    return gate.open(residual * Vec6::Unit(0), noise);
+  };
+  ResidualNoise noise = noiseOfFive();
+  noise.weight.setConstant(75.0);  // 4.5 sqrt(100.25)
+  EXPECT_FALSE(passes(45.0, noise));
+  EXPECT_TRUE(passes(45.1, noise));
+  noise = noiseOfFive();
+  const double one = largestFelt(c.servo, 0.01, 1);
+  noise.legs.setConstant(10.0 / one);
+  EXPECT_FALSE(passes(22.6 + 9.9, noise));
+  EXPECT_TRUE(passes(22.7 + 10.1, noise));
+}
+
+TEST(LargestFelt, IsTheLagsAloneBehindAQuickFilterAndTheWholeStepOverALongTime) {
+  ServoModel servo = config({"sensor.readings_per_tick=4"}).servo;
+  const double tau = servo.tau(0);
+  // All of 1 m/s in two seconds; the filter overshoots by 4.3 %, behind the lag by less.
+  EXPECT_GT(largestFelt(servo, 0.01, 200), 1.0 / 2.0);
+  EXPECT_LT(largestFelt(servo, 0.01, 200), 1.043 / 2.0);
+  servo.sensor_cutoff = 1e4;
+  EXPECT_NEAR(largestFelt(servo, 0.01, 1), (1.0 - std::exp(-0.01 / tau)) / 0.01, 0.5);
+  servo.sensor_window = 0.0;
+  EXPECT_NEAR(largestFelt(servo, 0.01, 1), 1.0 / tau, 0.03 / tau);  // of the first instant
+}
+
+}  // namespace
+}  // namespace ves

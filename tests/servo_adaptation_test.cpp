@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// The servos' gains and delay, learnt beside the simulated machine's own LegSlaves and cylinders.
+#include "ves/control/servo_adaptation.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "support/leg.hpp"
+#include "support/rig.hpp"
+
+namespace ves {
+namespace {
+
+constexpr double kPeriod = 0.01;            // [s]
+constexpr std::int64_t kTick = 10'000'000;  // [ns]
+const AdaptationSettings kSettings = {0.05, 5e-4, 1.5, 60.0};
+
+/// A leg of the machine that swings, and what is learnt of it. All six readings are of this leg.
+class Learning {
+ public:
+  /// Gains `extend` and `retract` times the believed ones, commands `late` [s] on the way.
+  Learning(double extend, double retract, double late,
+           const AdaptationSettings& settings = kSettings)
+      : e_(test::experiment("z_sine")),
+        late_(late),
+        leg_(machine(e_.plant, extend, retract), kMiddle),
+        learns_(e_.controller.servo, settings, kPeriod) {
+    learns_.reset(Vec6::Constant(kMiddle), 0);
+    counts_ = leg_.config.transducer.count(kMiddle);
+  }
+
+  /// On by `time` [s], the reference swinging by `amplitude` [m] in two frequencies.
+  void swing(double time, double amplitude) {
+    for (const std::int64_t end = k_ + std::lround(time / kPeriod); k_ < end; ++k_) {
+      const double t = static_cast<double>(k_) * kPeriod;
+      const double r = kMiddle + amplitude * (std::sin(2.0 * M_PI * 0.9 * t) +
+                                              0.3 * std::sin(2.0 * M_PI * 2.3 * t));
+      const LegCounts counts = legCounts(e_.controller.legs, Vec6::Constant(r));
+      learns_.send(legLengths(e_.controller.legs, counts), k_, k_ * kTick);
+      leg_.run(counts_, late_);
+      counts_ = counts[0];
+      leg_.run(counts_, kPeriod - late_);
+      learns_.learn(Vec6::Constant(reading()), (k_ + 1) * kTick);
+    }
+  }
+  double reading() const {
+    LegCounts read{};
+    read.fill(leg_.config.transducer.count(leg_.actuator.length()));
+    return legLengths(e_.controller.legs, read)(0);
+  }
+
+  const ServoModel& believed() const { return e_.controller.servo; }
+  double extend() const { return learns_.gains().extend(0) / believed().extend(0); }
+  double retract() const { return learns_.gains().retract(0) / believed().retract(0); }
+  double delay() const { return learns_.gains().delay(0) - believed().delay(0); }
+  ServoAdaptation& learns() { return learns_; }
+  std::int64_t time() const { return k_ * kTick; }
+
+ private:
+  static constexpr double kMiddle = 1.5;  // [m]
+  static plant::PlantConfig machine(plant::PlantConfig p, double extend, double retract) {
+    p.actuator.gain_extend *= extend;
+    p.actuator.gain_retract *= retract;
+    return p;
+  }
+  Experiment e_;
+  double late_;
+  test::Leg leg_;
+  ServoAdaptation learns_;
+  std::int32_t counts_ = 0;
+  std::int64_t k_ = 0;
+};
+
+TEST(ServoAdaptation, FindsWhatTheServosAreOffBy) {
+  for (const auto& [extend, retract, late] :
+       {std::tuple{1.05, 0.97, 0.0}, std::tuple{0.95, 0.95, 3e-4}, std::tuple{1.0, 1.06, 6e-4},
+        std::tuple{1.0, 1.0, 0.0}}) {
+    Learning one(extend, retract, late);
+    one.swing(20.0, 0.02);  // what is of second order, 0.05^2, is left
+    EXPECT_NEAR(one.extend(), extend, 0.006) << extend << retract << late;
+    EXPECT_NEAR(one.retract(), retract, 0.006) << extend << retract << late;
+    // A LegSlave looks anywhere in its update of 0.7 ms; the model takes the middle.
+    EXPECT_NEAR(one.delay(), late, 3e-4) << extend << retract << late;
+  }
+}
+
+TEST(ServoAdaptation, FollowsServosThatChange) {
+  AdaptationSettings quick = kSettings;
+  quick.forgetting = 5.0;
+  Learning one(1.05, 1.05, 0.0, quick), slow(1.05, 1.05, 0.0);
+  for (Learning* each : {&one, &slow}) each->swing(10.0, 0.02);
+  EXPECT_NEAR(one.extend(), 1.05, 0.006);
+}
+
+TEST(ServoAdaptation, KeepsWhatItHasWhileNothingMoves) {
+  Learning one(1.05, 0.97, 0.0);
+  one.swing(10.0, 0.02);
+  one.swing(2.0, 0.0);  // comes to rest
+  const ServoGains before = one.learns().gains();
+  one.swing(100.0, 0.0);
+  EXPECT_EQ(one.learns().gains().extend, before.extend);
+  EXPECT_EQ(one.learns().gains().retract, before.retract);
+  EXPECT_EQ(one.learns().gains().delay, before.delay);
+  EXPECT_GT(one.extend(), 1.03);
+  one.learns().reset(Vec6::Constant(1.5), one.time());  // a new start of the legs changes nothing
+  EXPECT_EQ(one.learns().gains().extend, before.extend);
+}
+
+TEST(ServoAdaptation, GoesNoFurtherThanItMay) {
+  for (const double factor : {0.8, 1.25}) {
+    Learning one(factor, factor, 0.0);
+    for (int k = 0; k < 40; ++k) {
+      one.swing(0.5, 0.004);
+      EXPECT_LE(std::abs(one.extend() - 1.0), 0.05 * 1.5 + 1e-12);
+      EXPECT_LE(std::abs(one.retract() - 1.0), 0.05 * 1.5 + 1e-12);
+      EXPECT_LE(std::abs(one.delay()), 5e-4 * 1.5 + 1e-12);
+    }
+    EXPECT_NEAR(one.extend(), factor < 1.0 ? 0.925 : 1.075, 1e-12);
+  }
+}
+
+TEST(ServoAdaptation, AReadingThatNoServoExplainsTeachesNothing) {
+  Learning one(1.03, 1.03, 0.0);
+  one.swing(5.0, 0.02);
+  const ServoGains before = one.learns().gains();
+  one.learns().learn(Vec6::Constant(one.reading() + 0.02), one.time() + 1'000'000);
+  one.learns().learn(Vec6::Constant(std::numeric_limits<double>::quiet_NaN()),
+                     one.time() + 2'000'000);
+  one.learns().learn(Vec6::Constant(one.reading() + 0.001), one.time() - kTick);  // in the past
+  EXPECT_EQ(one.learns().gains().extend, before.extend);
+  EXPECT_EQ(one.learns().gains().delay, before.delay);
+}
+
+TEST(ServoAdaptation, WithoutDoubtOfTheBeliefNothingIsLearnt) {
+  AdaptationSettings sure = kSettings;
+  sure.gain = sure.delay = 0.0;
+  Learning one(1.05, 1.05, 0.0, sure);
+  one.swing(5.0, 0.02);
+  EXPECT_EQ(one.extend(), 1.0);
+  EXPECT_EQ(one.delay(), 0.0);
+}
+
+}  // namespace
+}  // namespace ves
