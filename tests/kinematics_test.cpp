@@ -49,6 +49,49 @@ TEST(ForwardPose, StaysOrthogonalOverAMillionWarmStarts) {
   EXPECT_LT((X.R.transpose() * X.R - Mat3::Identity()).norm(), 1e-13);
 }
 
+TEST(ForwardPose, WithTheFactorsOfThePoseBeforeFindsTheSame) {
+  const Geometry g = geometry();
+  JacobianFactors factors;
+  BodyMotion P;
+  for (const Pose& x : test::poses(2000)) {  // from home, however far
+    const Transform X_IP = g.fromHome(x), home = g.fromHome({});
+    ASSERT_TRUE(
+        forwardMotion(g, home, {legLengths(g, home), Vec6::Zero(), Vec6::Zero()}, P, factors));
+    const ForwardSolution found = forwardPose(g, legLengths(g, X_IP), home, factors);
+    ASSERT_TRUE(found.ok()) << x.stacked().transpose();
+    const Vec6 off = legLengths(g, found.X_IP) - legLengths(g, X_IP);
+    ASSERT_LE(off.cwiseAbs().maxCoeff(), 1.01 * kForwardTolerance) << x.stacked().transpose();
+    ASSERT_LT(distance(found.X_IP, X_IP), 1e-5) << x.stacked().transpose();  // the same root
+  }
+  // Of a pose nearby they do: two steps, and no factors in between.
+  const test::Swing swing(8);
+  Transform X = g.fromHome(Pose::from(swing.x(0.0)));
+  const LegMotion rest{legLengths(g, X), Vec6::Zero(), Vec6::Zero()};
+  ASSERT_TRUE(forwardMotion(g, X, rest, P, factors));
+  for (int i = 1; i < 1000; ++i) {
+    const Transform next = g.fromHome(Pose::from(swing.x(i * 1e-4)));
+    const Mat6 before = factors.lu.matrixLU();
+    const ForwardSolution found = forwardPose(g, legLengths(g, next), X, factors);
+    ASSERT_TRUE(found.ok());
+    ASSERT_LT(distance(found.X_IP, next), 1e-8);
+    ASSERT_EQ(factors.lu.matrixLU(), before) << i;
+    ASSERT_TRUE(forwardMotion(g, found.X_IP, {legLengths(g, next), Vec6::Zero(), Vec6::Zero()}, P,
+                              factors));
+    X = found.X_IP;
+  }
+}
+
+TEST(RotationOf, IsTheExponentialForEveryAngle) {
+  for (const Vec3& axis : {Vec3(1, 0, 0), Vec3(0.3, -0.5, 0.8), Vec3(-0.1, 0.9, 0.2)})
+    for (const double angle : {0.0, 1e-9, 1e-4, 0.00999, 0.01001, 0.5, 3.0, -2.0}) {
+      const Vec3 v = angle * axis.normalized();
+      Mat3 series = Mat3::Identity(), term = Mat3::Identity();
+      for (int n = 1; n < 40; ++n) series += term = (term * skew(v) / n).eval();
+      EXPECT_LT((rotationOf(v) - series).norm(), 1e-14 * std::max(1.0, std::exp(std::abs(angle))))
+          << angle;
+    }
+}
+
 TEST(ForwardPose, NeverCallsNonsenseASuccess) {
   const Geometry g = geometry();
   const Transform home = g.fromHome({});

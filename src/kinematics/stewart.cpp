@@ -19,11 +19,19 @@ Leg leg(const Geometry& g, const Transform& X_IP, int i) {
   return {X_IP.p + r - g.p_IBi_I[k], r};
 }
 
+using Legs = std::array<Leg, kLegs>;
+
+Legs legs(const Geometry& g, const Transform& X_IP) {
+  Legs out;
+  for (int i = 0; i < kLegs; ++i) out[static_cast<std::size_t>(i)] = leg(g, X_IP, i);
+  return out;
+}
+
 /// Row i maps the twist {v_IPo_I, w_IP_I} to L_i dL_i/dt.
-Mat6 halfJacobian(const Geometry& g, const Transform& X_IP) {
+Mat6 halfJacobian(const Legs& legs) {
   Mat6 J;
   for (int i = 0; i < kLegs; ++i) {
-    const Leg l = leg(g, X_IP, i);
+    const Leg& l = legs[static_cast<std::size_t>(i)];
     J.row(i) << l.d.transpose(), l.r.cross(l.d).transpose();
   }
   return J;
@@ -33,6 +41,54 @@ Mat6 halfJacobian(const Geometry& g, const Transform& X_IP) {
 bool regular(const Eigen::PartialPivLU<Mat6>& lu) {
   const Vec6 pivots = lu.matrixLU().diagonal().cwiseAbs();
   return pivots.minCoeff<Eigen::PropagateNaN>() > 1e-12 * pivots.maxCoeff<Eigen::PropagateNaN>();
+}
+
+/// Factorises; whether the matrix is regular.
+bool factorise(const Legs& legs, JacobianFactors& out) {
+  out.lu.compute(halfJacobian(legs));
+  return out.known = regular(out.lu);
+}
+
+/// Newton-Raphson. The last factors do for another step where the step before has left no more than
+/// `leaves` [-] of the residual: with those of a pose so near, the next one leaves as little.
+ForwardSolution solve(const Geometry& geometry, const Vec6& L, const Transform& guess,
+                      JacobianFactors& factors, double leaves) noexcept {
+  ForwardSolution out;
+  out.X_IP = guess;
+  if (!L.allFinite() || !(L.minCoeff() > 0.0)) return out;
+  if (!guess.p.allFinite() || !guess.R.allFinite()) return out;
+  double before = HUGE_VAL;  // [m]
+  for (out.iterations = 0;; ++out.iterations) {
+    const Legs at = legs(geometry, out.X_IP);
+    Vec6 f;  // half of (2.22): (|d|^2 - L^2) / 2
+    for (int i = 0; i < kLegs; ++i)
+      f(i) = 0.5 * (at[static_cast<std::size_t>(i)].d.squaredNorm() - L(i) * L(i));
+    out.residual = (f.array() / L.array()).abs().maxCoeff<Eigen::PropagateNaN>();
+    if (!std::isfinite(out.residual)) {
+      out.status = SolveStatus::kInvalid;
+      return out;
+    }
+    if (out.residual <= kForwardTolerance) {
+      // One step of the polar iteration: warm starts must not let R drift from orthogonality.
+      out.X_IP.R =
+          0.5 * out.X_IP.R * (3.0 * Mat3::Identity() - out.X_IP.R.transpose() * out.X_IP.R);
+      out.status = SolveStatus::kConverged;
+      return out;
+    }
+    if (out.iterations == kForwardIterations) {
+      out.status = SolveStatus::kIterationLimit;
+      return out;
+    }
+    const bool near = factors.known && out.residual < leaves * before;
+    if (!near && !factorise(at, factors)) {
+      out.status = SolveStatus::kSingular;
+      return out;
+    }
+    before = out.residual;
+    const Vec6 step = factors.lu.solve(-f);
+    out.X_IP.p += step.head<3>();
+    out.X_IP.R = rotationOf(step.tail<3>()) * out.X_IP.R;
+  }
 }
 
 }  // namespace
@@ -72,43 +128,13 @@ BodyMotion bodyMotion(const Geometry& geometry, const Pose& x, const Vec6& x_dot
 
 ForwardSolution forwardPose(const Geometry& geometry, const Vec6& L,
                             const Transform& guess) noexcept {
-  ForwardSolution out;
-  out.X_IP = guess;
-  if (!L.allFinite() || !(L.minCoeff() > 0.0)) return out;
-  if (!guess.p.allFinite() || !guess.R.allFinite()) return out;
-  for (out.iterations = 0;; ++out.iterations) {
-    Vec6 f;  // half of (2.22): (|d|^2 - L^2) / 2
-    Mat6 J;  // half of its derivative with respect to the twist
-    for (int i = 0; i < kLegs; ++i) {
-      const Leg l = leg(geometry, out.X_IP, i);
-      f(i) = 0.5 * (l.d.squaredNorm() - L(i) * L(i));
-      J.row(i) << l.d.transpose(), l.r.cross(l.d).transpose();
-    }
-    out.residual = (f.array() / L.array()).abs().maxCoeff<Eigen::PropagateNaN>();
-    if (!std::isfinite(out.residual)) {
-      out.status = SolveStatus::kInvalid;
-      return out;
-    }
-    if (out.residual <= kForwardTolerance) {
-      // One step of the polar iteration: warm starts must not let R drift from orthogonality.
-      out.X_IP.R =
-          0.5 * out.X_IP.R * (3.0 * Mat3::Identity() - out.X_IP.R.transpose() * out.X_IP.R);
-      out.status = SolveStatus::kConverged;
-      return out;
-    }
-    if (out.iterations == kForwardIterations) {
-      out.status = SolveStatus::kIterationLimit;
-      return out;
-    }
-    const Eigen::PartialPivLU<Mat6> lu(J);
-    if (!regular(lu)) {
-      out.status = SolveStatus::kSingular;
-      return out;
-    }
-    const Vec6 step = lu.solve(-f);
-    out.X_IP.p += step.head<3>();
-    out.X_IP.R = rotationOf(step.tail<3>()) * out.X_IP.R;
-  }
+  JacobianFactors factors;
+  return solve(geometry, L, guess, factors, 1e-3);
+}
+
+ForwardSolution forwardPose(const Geometry& geometry, const Vec6& L, const Transform& guess,
+                            JacobianFactors& near) noexcept {
+  return solve(geometry, L, guess, near, 0.1);
 }
 
 double conditionNumber(const Geometry& geometry, const Transform& X_IP) noexcept {
@@ -125,21 +151,27 @@ double conditionNumber(const Geometry& geometry, const Transform& X_IP) noexcept
 
 bool forwardMotion(const Geometry& geometry, const Transform& X_IP, const LegMotion& legs,
                    BodyMotion& P) noexcept {
-  P.X = X_IP;
-  const Eigen::PartialPivLU<Mat6> lu(halfJacobian(geometry, X_IP));
-  if (!regular(lu)) return false;
+  JacobianFactors factors;
+  return forwardMotion(geometry, X_IP, legs, P, factors);
+}
 
-  const Vec6 twist = lu.solve(legs.L.cwiseProduct(legs.L_dot));
+bool forwardMotion(const Geometry& geometry, const Transform& X_IP, const LegMotion& motion,
+                   BodyMotion& P, JacobianFactors& here) noexcept {
+  P.X = X_IP;
+  const Legs at = legs(geometry, X_IP);
+  if (!factorise(at, here)) return false;
+
+  const Vec6 twist = here.lu.solve(motion.L.cwiseProduct(motion.L_dot));
   P.v = twist.head<3>();
   P.w = twist.tail<3>();
 
   // d/dt (d . v_Pi) = |v_Pi|^2 + d . a_Pi, with the centripetal part of a_Pi on the right.
-  Vec6 rhs = legs.L_dot.cwiseAbs2() + legs.L.cwiseProduct(legs.L_ddot);
+  Vec6 rhs = motion.L_dot.cwiseAbs2() + motion.L.cwiseProduct(motion.L_ddot);
   for (int i = 0; i < kLegs; ++i) {
-    const Leg l = leg(geometry, X_IP, i);
+    const Leg& l = at[static_cast<std::size_t>(i)];
     rhs(i) -= (P.v + P.w.cross(l.r)).squaredNorm() + l.d.dot(P.w.cross(P.w.cross(l.r)));
   }
-  const Vec6 acceleration = lu.solve(rhs);
+  const Vec6 acceleration = here.lu.solve(rhs);
   P.a = acceleration.head<3>();
   P.alpha = acceleration.tail<3>();
   return true;

@@ -204,11 +204,20 @@ void Plant::readTransducers() noexcept {
   if (slaves_[0].updated()) next_step_ = now_ + kMidUpdate;
 }
 
-Wrench Plant::sensorLoad() const noexcept {
+Wrench Plant::sensorLoad() noexcept {
   const Transform X_PL0 = config_.payload.X_PL0();
   const ProperMotion felt = properMotion(truth_.P, X_PL0, config_.gravity);
-  const Wrench on_robot = newtonEuler(robot_.model(), truth_.joints, felt).F_L0o_L0;
-  return transfer(X_SL0_, Wrench{} - on_robot);
+  return transfer(X_SL0_, Wrench{} - wrenchOnRobot(felt));
+}
+
+/// F_L0o_L0. A robot that stands is one body.
+Wrench Plant::wrenchOnRobot(const ProperMotion& L0) noexcept {
+  const JointState& joints = truth_.joints;
+  if (!joints.q_dot.isZero(0.0) || !joints.q_ddot.isZero(0.0))
+    return newtonEuler(robot_.model(), joints, L0).F_L0o_L0;
+  if (!standing_ || standing_->q != joints.q)
+    standing_ = Standing{joints.q, compositeBody(robot_.model(), joints.q)};
+  return inertialWrench(standing_->body_L0, L0);
 }
 
 LegMotion Plant::legOutputs(double dt) noexcept {
@@ -246,8 +255,9 @@ void Plant::stepMechanics() noexcept {
   Transform guess = truth_.P.X;
   guess.p += dt * truth_.P.v;
   guess.R = rotationOf(dt * truth_.P.w) * guess.R;
-  const ForwardSolution forward = forwardPose(config_.geometry, legs.L, guess);
-  truth_.legs_agree = forward.ok() && forwardMotion(config_.geometry, forward.X_IP, legs, truth_.P);
+  const ForwardSolution forward = forwardPose(config_.geometry, legs.L, guess, jacobian_);
+  truth_.legs_agree =
+      forward.ok() && forwardMotion(config_.geometry, forward.X_IP, legs, truth_.P, jacobian_);
   truth_.joints = real_joints_ ? *real_joints_ : robot_.at(now_);
 
   const Wrench F_So_S = sensorLoad();

@@ -71,6 +71,14 @@ RobotModel withLoad(RobotModel robot, int link, const RigidBody& load) noexcept 
 Transform linkPose(const Link& link, double q) noexcept {
   switch (link.type) {
     case JointType::kRevolute:
+      if (link.axis == Vec3::UnitZ()) {  // as in DH parameters, and most of the time
+        const double s = std::sin(q), c = std::cos(q);
+        const Mat3& R = link.X_parent.R;
+        Transform X = link.X_parent;
+        X.R.col(0) = c * R.col(0) + s * R.col(1);
+        X.R.col(1) = c * R.col(1) - s * R.col(0);
+        return X;
+      }
       return {link.X_parent.R * Eigen::AngleAxisd(q, link.axis).toRotationMatrix(),
               link.X_parent.p};
     case JointType::kPrismatic: return {link.X_parent.R, link.X_parent * Vec3(q * link.axis)};

@@ -4,7 +4,8 @@
 //
 //   random_machines emulation N [SEED [SET...]]   the DOSS on the Shuttle's arm, six modes: gains,
 //       masses, centres of mass and tau off by up to 10 %, samples 0 to 3 ticks late, read and
-//       commanded up to 2 ms before and after their ticks; half of them on Earth
+//       commanded up to 2 ms before and after their ticks; a third of them in space, on Earth, and
+//       on Earth with masses and centres that are known, as after an identification
 //   random_machines late N [SEED [SET...]]        the same machine as believed, N ticks late
 //   random_machines gate N [SEED [SET...]]        a PUMA on bases near the limit of stability, off
 //       by what the gate allows for: what it admits beside what then grows
@@ -139,9 +140,11 @@ int late(int ticks, unsigned seed, const Sets& set) {
   return 0;
 }
 
+constexpr const char* kWhere[] = {"0 g", "on Earth", "on Earth, masses known"};
+
 int emulations(int n, unsigned seed, const Sets& set) {
   struct One {
-    bool earth = false;
+    int where = 0;  // of kWhere
     int late = 0;
     std::string ended;
     double off = NAN;  // [-] rms over peak
@@ -150,14 +153,17 @@ int emulations(int n, unsigned seed, const Sets& set) {
   all(n, [&](int i) {
     Dice dice(seed + static_cast<unsigned>(i));
     One& one = ones[static_cast<std::size_t>(i)];
-    one.earth = i % 2 == 0;
+    one.where = i % 3;
     const std::string arm = kArms[dice.whole(0, 3)];
     const auto factor = [&] { return dice.between(0.9, 1.1); };
+    const double extend = factor(), retract = factor(), tau = factor(), mass = factor(),
+                 center = factor();
+    const bool known = one.where == 2;
     const Sets machine = {
         fmt::format("plant_mismatch={{gain_extend: {}, gain_retract: {}, tau: {}, mass: {}, "
                     "center: {}}}",
-                    factor(), factor(), factor(), factor(), factor()),
-        fmt::format("gravity_m_per_s2={}", one.earth ? 9.81 : 0.0), "base.keep_modes=6"};
+                    extend, retract, tau, known ? 1.0 : mass, known ? 1.0 : center),
+        fmt::format("gravity_m_per_s2={}", one.where > 0 ? 9.81 : 0.0), "base.keep_modes=6"};
     one.late = dice.whole(0, 3);
     const auto jitter = static_cast<std::int64_t>(dice.between(0.0, 2e6));
     const Experiment e =
@@ -171,12 +177,12 @@ int emulations(int n, unsigned seed, const Sets& set) {
                               ended.cause == Check::kCount ? "no check" : name(ended.cause));
     }
   });
-  for (const bool earth : {false, true}) {
+  for (int where = 0; where < 3; ++where) {
     std::vector<double> off;
     std::map<std::string, int> others;
     std::map<int, std::vector<double>> by_late;
     for (const One& one : ones) {
-      if (one.earth != earth) continue;
+      if (one.where != where) continue;
       if (one.ended.empty()) {
         off.push_back(one.off);
         by_late[one.late].push_back(one.off);
@@ -185,7 +191,7 @@ int emulations(int n, unsigned seed, const Sets& set) {
       }
     }
     fmt::print("{}: {} ran; rms over peak: median {:.2f} %, 90 % below {:.2f} %, worst {:.2f} %\n",
-               earth ? "on Earth" : "0 g", off.size(), 100 * at(off, 0.5), 100 * at(off, 0.9),
+               kWhere[where], off.size(), 100 * at(off, 0.5), 100 * at(off, 0.9),
                100 * at(off, 1.0));
     for (const auto& [late, values] : by_late)
       fmt::print("  {} ticks late: {} ran, median {:.2f} %, worst {:.2f} %\n", late, values.size(),

@@ -4,6 +4,7 @@
 // kinematics of position (2.23), rate (2.24) and acceleration (2.32).
 #pragma once
 
+#include <Eigen/LU>
 #include <array>
 
 #include "ves/math/frames.hpp"
@@ -73,6 +74,19 @@ inline constexpr int kForwardIterations = 20;
 ForwardSolution forwardPose(const Geometry& geometry, const Vec6& L,
                             const Transform& guess) noexcept;
 
+/// The Jacobian of one pose, factorised. From look to look a platform hardly moves, and what was
+/// factorised at the last pose does for the next.
+struct JacobianFactors {
+  Eigen::PartialPivLU<Mat6> lu;  // of half the derivative of (2.22) with respect to the twist
+  bool known = false;
+};
+
+/// The same root, beginning with the Jacobian of a pose `near` the guess and keeping it as long as
+/// each step takes nine tenths of what is left; factorises anew where it does not. From afar a
+/// first step with it may lead to another root.
+ForwardSolution forwardPose(const Geometry& geometry, const Vec6& L, const Transform& guess,
+                            JacobianFactors& near) noexcept;
+
 /// |J| |J^-1| / 6 in the Frobenius norm, of the Jacobian from twists to leg rates with lengths
 /// counted in metres: 1 at best, infinite where the legs cannot hold the platform.
 double conditionNumber(const Geometry& geometry, const Transform& X_IP) noexcept;
@@ -82,5 +96,8 @@ double conditionNumber(const Geometry& geometry, const Transform& X_IP) noexcept
 /// then only P.X is set.
 bool forwardMotion(const Geometry& geometry, const Transform& X_IP, const LegMotion& legs,
                    BodyMotion& P) noexcept;
+/// The same; leaves the Jacobian at X_IP in `here`.
+bool forwardMotion(const Geometry& geometry, const Transform& X_IP, const LegMotion& legs,
+                   BodyMotion& P, JacobianFactors& here) noexcept;
 
 }  // namespace ves

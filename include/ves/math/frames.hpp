@@ -137,9 +137,27 @@ inline Mat3 angleRateMapDerivative(const Vec3& rpy, const Vec3& rpy_dot) {
 
 /// Rotation by the vector v (axis times angle), Rodrigues.
 inline Mat3 rotationOf(const Vec3& v) {
-  const double angle = v.norm();
-  if (!(angle > 0.0)) return Mat3::Identity();
-  return Eigen::AngleAxisd(angle, v / angle).toRotationMatrix();
+  // I + sin(t)/t S + (1 - cos(t))/t^2 S^2 with S = skew(v), t = |v|; series where t is small.
+  const double t2 = v.squaredNorm();
+  double first, second;
+  if (t2 < 1e-4) {
+    first = 1.0 - t2 / 6.0 * (1.0 - t2 / 20.0 * (1.0 - t2 / 42.0));
+    second = 0.5 - t2 / 24.0 * (1.0 - t2 / 30.0 * (1.0 - t2 / 56.0));
+  } else {
+    const double t = std::sqrt(t2), half = std::sin(0.5 * t);
+    first = std::sin(t) / t;
+    second = 2.0 * half * half / t2;
+  }
+  const Vec3 u = first * v;
+  Mat3 R = second * v * v.transpose();
+  R.diagonal().array() += 1.0 - second * t2;
+  R(0, 1) -= u.z();
+  R(0, 2) += u.y();
+  R(1, 0) += u.z();
+  R(1, 2) -= u.x();
+  R(2, 0) -= u.y();
+  R(2, 1) += u.x();
+  return R;
 }
 
 /// The matrix (3.10): skew(a) * b = a x b.

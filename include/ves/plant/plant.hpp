@@ -104,7 +104,10 @@ class Plant {
   void command(const LegCommand& command) noexcept;
 
   /// Begins now; false where MovingRobot::begin() refuses.
-  bool moveRobot(const RobotAction& action) noexcept { return robot_.begin(action, now_); }
+  bool moveRobot(const RobotAction& action) noexcept {
+    standing_.reset();
+    return robot_.begin(action, now_);
+  }
 
   /// Legs, or joints, that are elsewhere: the platform, or the robot, is where they say from the
   /// next step on, and no longer where the simulated ones are.
@@ -138,7 +141,8 @@ class Plant {
   void averageSensor(Sample& sample) const noexcept;
   void planRobotEvent() noexcept;
   void startRobotEvents() noexcept;
-  Wrench sensorLoad() const noexcept;
+  Wrench sensorLoad() noexcept;
+  Wrench wrenchOnRobot(const ProperMotion& L0) noexcept;
   LegMotion legOutputs(double dt) noexcept;
 
   PlantConfig config_;
@@ -173,6 +177,12 @@ class Plant {
   std::vector<bool> robot_event_done_;
   int refused_events_ = 0;
   MovingRobot robot_;  // all rigid plates counted into its base
+  struct Standing {
+    JointVector q;
+    RigidBody body_L0;
+  };
+  std::optional<Standing> standing_;  // the robot while its joints stand
+  JacobianFactors jacobian_;          // at the last step
   std::optional<LegMotion> real_legs_;
   std::optional<JointState> real_joints_;
   Truth truth_;
