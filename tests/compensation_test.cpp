@@ -23,6 +23,7 @@ namespace {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using test::Rig;
 
 const std::vector<std::string> kPublished;
 const std::vector<std::string> kAll = {"controller.compensation.feed_forward=true",
@@ -267,6 +268,42 @@ TEST_F(Emulation, AnAidedWrenchKeepsTheNoiseOut) {  // of the sensor, in motions
     ASSERT_TRUE(result_.good()) << configuration;
     EXPECT_LT(share(e, series), 0.05) << configuration;
   }
+}
+
+TEST_F(Emulation, WhatIsLearntGoesByTheTimesThatTheMachineEchoes) {
+  Rig rig(experiment("z_sine", with(kAll, kAdapts), {}));
+  const std::int64_t period = 10'000'000;  // [ns]
+  rig.disturb([&](Sample& s) {             // it says that they came 2 ms later than they did
+    s.command_tick = s.time / period - 1;
+    s.command_time = s.time - period + 2'000'000;
+  });
+  rig.tick(Request::kStart);
+  rig.until(Phase::kParked);
+  // Then they take effect sooner after that.
+  for (int i = 0; i < kLegs; ++i) EXPECT_LT(rig.state().servo.delay(i), -4e-4) << i;
+}
+
+TEST_F(Emulation, AnAidedWrenchComesInAndGoesOutWithTheCompensation) {
+  Rig rig(
+      experiment("srms_low_hover_puma", with(kAll, kAided), with({"base.keep_modes=2"}, kMean)));
+  const auto admitted = [](const TickState& s) { return s.kind == SegmentKind::kAdmittance; };
+  rig.tick(Request::kStart);
+  int withheld = 0, between = 0;
+  for (int i = 0; i < 3000 && !test::done(rig.state()); ++i) {
+    const TickState& s = rig.tick();
+    const Vec6 measured = (s.total - s.static_wrench + s.inertial).stacked(),
+               reaction = s.reaction.stacked();
+    const Vec6 should =
+        s.withholds ? measured + s.compensation_share * (reaction - measured) : measured;
+    ASSERT_LT((s.dynamic.stacked() - should).norm(), 1e-9) << s.tick;
+    EXPECT_TRUE(!s.withholds || s.calibration == Calibration::Status::kDone) << s.tick;
+    between += s.withholds && s.compensation_share > 0.1 && s.compensation_share < 0.9;
+    // The bias has just been found: what was measured beyond another one does not count.
+    if (admitted(s) && i < 230) withheld += s.withholds;
+    if (admitted(s) && i == 600) rig.tick(Request::kUncompensate);
+  }
+  EXPECT_GT(withheld, 10);
+  EXPECT_GT(between, 20);
 }
 
 TEST_F(Emulation, AnAidedWrenchLetsAPushThatNoModelKnowsPass) {

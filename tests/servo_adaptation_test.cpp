@@ -22,8 +22,8 @@ class Learning {
  public:
   /// Gains `extend` and `retract` times the believed ones, commands `late` [s] on the way.
   Learning(double extend, double retract, double late,
-           const AdaptationSettings& settings = kSettings)
-      : e_(test::experiment("z_sine")),
+           const AdaptationSettings& settings = kSettings, int K_D = 0)
+      : e_(test::experiment("z_sine", {"legs.K_D=" + std::to_string(K_D)})),
         late_(late),
         leg_(machine(e_.plant, extend, retract), kMiddle),
         learns_(e_.controller.servo, settings, kPeriod) {
@@ -42,6 +42,7 @@ class Learning {
       leg_.run(counts_, late_);
       counts_ = counts[0];
       leg_.run(counts_, kPeriod - late_);
+      if (echoes) learns_.arrived(k_, k_ * kTick + std::llround(late_ * 1e9));
       learns_.learn(Vec6::Constant(reading()), (k_ + 1) * kTick);
     }
   }
@@ -56,6 +57,7 @@ class Learning {
   double retract() const { return learns_.gains().retract(0) / believed().retract(0); }
   double delay() const { return learns_.gains().delay(0) - believed().delay(0); }
   ServoAdaptation& learns() { return learns_; }
+  bool echoes = false;  // the machine says when a command came
   std::int64_t time() const { return k_ * kTick; }
 
  private:
@@ -84,6 +86,28 @@ TEST(ServoAdaptation, FindsWhatTheServosAreOffBy) {
     // A LegSlave looks anywhere in its update of 0.7 ms; the model takes the middle.
     EXPECT_NEAR(one.delay(), late, 3e-4) << extend << retract << late;
   }
+}
+
+TEST(ServoAdaptation, KnowsTheDerivativeGainAndTheRail) {
+  Learning derivative(1.05, 0.96, 0.0, kSettings, 3000);
+  derivative.swing(20.0, 0.02);
+  EXPECT_NEAR(derivative.extend(), 1.05, 0.006);
+  EXPECT_NEAR(derivative.retract(), 0.96, 0.006);
+  // At the rail a leg goes as quickly as it can, whatever it is away by.
+  Learning rail(1.05, 0.96, 0.0);
+  ASSERT_GT(2.0 * M_PI * 0.9 * 0.18, rail.believed().retract(0) * rail.believed().rail);
+  rail.swing(20.0, 0.18);
+  EXPECT_NEAR(rail.extend(), 1.05, 0.006);
+  EXPECT_NEAR(rail.retract(), 0.96, 0.006);
+}
+
+TEST(ServoAdaptation, ACommandCountsFromWhenTheMachineSaysItCame) {
+  // 4 ms on the way: told so, it is no delay of the servos.
+  Learning told(1.0, 1.0, 0.004), untold(1.0, 1.0, 0.004);
+  told.echoes = true;
+  for (Learning* one : {&told, &untold}) one->swing(5.0, 0.02);
+  EXPECT_NEAR(told.delay(), 0.0, 3e-4);
+  EXPECT_NEAR(untold.delay(), 1.5 * kSettings.delay, 1e-12);
 }
 
 TEST(ServoAdaptation, FollowsServosThatChange) {

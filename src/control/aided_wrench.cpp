@@ -42,12 +42,9 @@ Wrench JointReaction::update(const KnownPayload& known, const Sample& sample) no
   if (!(ahead > 0.0)) return Wrench::from(filter_.output().matrix());
   Butterworth2<6> now = filter_;
   now.advance(now.prepare(ahead), (input_ + ahead / T_0 * (input_ - before)).array());
-  const Vec6 y_0 = filter_.output(), y_1 = now.output(), rate_y_0 = filter_.rate(),
-             rate_y_1 = now.rate();
-  if (!(window_ > 0.0)) return Wrench::from(y_1 - delay_ * rate_y_1);
-  // The mean of the cubic between the two, over about the window.
-  return Wrench::from(0.5 * (y_0 + y_1) + ahead / 12.0 * (rate_y_0 - rate_y_1) -
-                      delay_ / ahead * (y_1 - y_0));
+  const Vec6 y_0 = filter_.output(), y_1 = now.output(), rate = now.rate();
+  if (!(window_ > 0.0)) return Wrench::from(y_1 - delay_ * rate);
+  return Wrench::from(0.5 * (y_0 + y_1) - delay_ / ahead * (y_1 - y_0));
 }
 
 /// F_Po_P on the platform.
@@ -140,15 +137,11 @@ Wrench AidedWrench::update(const Input& in, bool engaged) noexcept {
   if (in.samples.fresh()) F_Po_P_ = joints_.update(in.known, in.samples.sample());
   reaction_ = rotate(in.X_IP.R, F_Po_P_);
   const Wrench residual = in.measured - reaction_;
+  if (!in.bias.calibrated()) return in.measured;
   if (in.samples.fresh()) {
-    if (in.bias.counts() != bias_) {  // what was before tells nothing of what comes
-      gate_.reset();
-      residuals_ = 0;
-      bias_ = in.bias.counts();
-    }
     constexpr std::int64_t kRefresh = 100;  // [-] samples: attitude and joints change slowly
-    if (residuals_++ % kRefresh == 0 || in.known.changed()) refreshNoise(in);
-    withholds_ = in.bias.calibrated() && !gate_.open(countsOf(residual, in.X_IP.R), noise_);
+    if (residuals_++ % kRefresh == 0) refreshNoise(in);
+    withholds_ = !gate_.open(countsOf(residual, in.X_IP.R), noise_);
   }
   return withholds_ ? in.measured + Wrench::from(-in.share * residual.stacked()) : in.measured;
 }

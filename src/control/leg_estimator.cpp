@@ -51,7 +51,6 @@ const Measured& LegEstimator::update(const SampleStream& samples, const Elapsed&
 
 void LegEstimator::adapt(const Sample& sample) noexcept {
   adaptation_.arrived(sample.command_tick, sample.command_time);
-  if (!readings_.taken()) return;
   adaptation_.learn(measured_.L, sample.legs_time);
   servo_.use(adaptation_.gains());
 }

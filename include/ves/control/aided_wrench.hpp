@@ -94,6 +94,7 @@ class AidedWrench {
   /// Of the newest sample; zero unless the wrench is aided.
   const Wrench& reaction() const noexcept { return reaction_; }  // F_Po_I, modelled
   bool withholds() const noexcept { return withholds_; }         // the residual
+  const ResidualNoise& noise() const noexcept { return noise_; }
 
  private:
   Vec6 countsOf(const Wrench& F_Po_I, const Mat3& R_IP) const noexcept;
@@ -108,7 +109,6 @@ class AidedWrench {
   JointReaction joints_;
   ResidualGate gate_;
   ResidualNoise noise_;
-  Vec6 bias_ = Vec6::Zero();    // [count] that the residuals so far are beyond
   std::int64_t residuals_ = 0;  // [-] so far
   Wrench F_Po_P_, reaction_;
   bool withholds_ = false;

@@ -33,7 +33,6 @@ class LegReadings {
   void reset() noexcept { known_ = false; }
 
   bool good() const noexcept { return wrong_ <= kPatience; }
-  bool taken() const noexcept { return wrong_ == 0; }  // the last one
 
  private:
   bool known_ = false;
