@@ -3,9 +3,6 @@
 // Seeded Gaussian noise.
 #pragma once
 
-#include <gsl/gsl_randist.h>
-#include <gsl/gsl_rng.h>
-
 #include <cstdint>
 #include <memory>
 
@@ -14,16 +11,11 @@ namespace ves::plant {
 /// Seeded Gaussian noise: the same seed gives the same values. Drawing allocates nothing.
 class Noise {
  public:
-  explicit Noise(std::uint32_t seed) : rng_(gsl_rng_alloc(gsl_rng_mt19937)) {
-    gsl_rng_set(rng_.get(), seed);
-  }
-  double normal() noexcept { return gsl_ran_gaussian_ziggurat(rng_.get(), 1.0); }
+  explicit Noise(std::uint32_t seed);
+  double normal() noexcept;
 
  private:
-  struct Free {
-    void operator()(gsl_rng* rng) const { gsl_rng_free(rng); }
-  };
-  std::unique_ptr<gsl_rng, Free> rng_;
+  std::unique_ptr<void, void (*)(void*)> generator_;  // GSL's, which no header of ours shows
 };
 
 }  // namespace ves::plant

@@ -1,0 +1,42 @@
+# Installs BUILD into a folder of its own, builds apps/examples/library against that with find_package
+# alone, and runs every program there.
+function(run)
+  execute_process(COMMAND ${ARGV} RESULT_VARIABLE result OUTPUT_VARIABLE out ERROR_VARIABLE out)
+  if(NOT result EQUAL 0)
+    message(FATAL_ERROR "${ARGV}: ${result}\n${out}")
+  endif()
+  message("${out}")
+endfunction()
+
+file(REMOVE_RECURSE ${WORK})
+run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${WORK}/prefix)
+run(${CMAKE_COMMAND} -S ${SOURCE}/apps/examples/library -B ${WORK}/build -G Ninja
+  -DCMAKE_PREFIX_PATH=${WORK}/prefix -DCMAKE_CXX_FLAGS=-Wall\ -Wextra\ -Werror)
+run(${CMAKE_COMMAND} --build ${WORK}/build)
+set(config ${WORK}/prefix/share/ves/config)
+run(${WORK}/build/hexapod)
+run(${WORK}/build/admittance)
+run(${WORK}/build/newton_euler ${config}/robots/puma560.urdf)
+run(${WORK}/build/controller ${config}/scenarios/puma_on_table_4_1.yaml)
+
+# What is not there is said, and the control path asks for Eigen alone.
+file(WRITE ${WORK}/none/CMakeLists.txt "cmake_minimum_required(VERSION 3.25)\nproject(none CXX)\n"
+  "find_package(ves 0.1 REQUIRED COMPONENTS warp)\n")
+execute_process(COMMAND ${CMAKE_COMMAND} -S ${WORK}/none -B ${WORK}/none/build
+  -DCMAKE_PREFIX_PATH=${WORK}/prefix RESULT_VARIABLE result OUTPUT_QUIET ERROR_VARIABLE out)
+if(result EQUAL 0 OR NOT out MATCHES "warp")
+  message(FATAL_ERROR "a component that does not exist: ${result}\n${out}")
+endif()
+file(WRITE ${WORK}/alone/CMakeLists.txt "cmake_minimum_required(VERSION 3.25)\nproject(alone CXX)\n"
+  "find_package(ves 0.1 REQUIRED COMPONENTS math kinematics robot control)\n"
+  "foreach(other GSL::gsl fmt::fmt yaml-cpp lcm::lcm ves::plant)\n"
+  "  if(TARGET \${other})\n    message(FATAL_ERROR \"brings \${other}\")\n  endif()\nendforeach()\n")
+run(${CMAKE_COMMAND} -S ${WORK}/alone -B ${WORK}/alone/build -DCMAKE_PREFIX_PATH=${WORK}/prefix)
+# No public header shows a library that its component does not link.
+file(GLOB_RECURSE headers ${WORK}/prefix/include/ves/*/*.hpp)
+foreach(header ${headers})
+  file(STRINGS ${header} leaks REGEX "#include <(lcm|gsl|nlohmann|yaml-cpp|fmt|kdl|urdf)")
+  if(leaks)
+    message(FATAL_ERROR "${header}: ${leaks}")
+  endif()
+endforeach()
