@@ -71,7 +71,8 @@ TEST(ForwardPose, WithTheFactorsOfThePoseBeforeFindsTheSame) {
   for (int i = 1; i < 1000; ++i) {
     const Transform next = g.fromHome(Pose::from(swing.x(i * 1e-4)));
     const Mat6 before = factors.lu.matrixLU();
-    const ForwardSolution found = forwardPose(g, legLengths(g, next), X, factors);
+    const Transform guess = g.fromHome(Pose::from(swing.x((i - 0.5) * 1e-4)));
+    const ForwardSolution found = forwardPose(g, legLengths(g, next), guess, factors);
     ASSERT_TRUE(found.ok());
     ASSERT_LT(distance(found.X_IP, next), 1e-8);
     ASSERT_EQ(factors.lu.matrixLU(), before) << i;

@@ -52,6 +52,13 @@ class Learning {
     return legLengths(e_.controller.legs, read)(0);
   }
 
+  /// At rest, the cylinder's gains change by a factor.
+  void become(double factor) {
+    leg_.config.actuator.gain_extend *= factor;
+    leg_.config.actuator.gain_retract *= factor;
+    leg_.actuator = plant::Actuator(leg_.config.actuator, leg_.actuator.length());
+  }
+
   const ServoModel& believed() const { return e_.controller.servo; }
   double extend() const { return learns_.gains().extend(0) / believed().extend(0); }
   double retract() const { return learns_.gains().retract(0) / believed().retract(0); }
@@ -116,6 +123,13 @@ TEST(ServoAdaptation, FollowsServosThatChange) {
   Learning one(1.05, 1.05, 0.0, quick), slow(1.05, 1.05, 0.0);
   for (Learning* each : {&one, &slow}) each->swing(10.0, 0.02);
   EXPECT_NEAR(one.extend(), 1.05, 0.006);
+  for (Learning* each : {&one, &slow}) {
+    each->swing(1.0, 0.0);
+    each->become(0.96 / 1.05);
+    each->swing(20.0, 0.02);
+  }
+  EXPECT_NEAR(one.extend(), 0.96, 0.01);
+  EXPECT_GT(slow.extend(), 0.975);  // ten seconds of the past weigh a third of what has come since
 }
 
 TEST(ServoAdaptation, KeepsWhatItHasWhileNothingMoves) {
