@@ -224,6 +224,29 @@ TEST(Plant, FiltersDelayTheOutputsOnly) {
   EXPECT_NEAR(plain - filtered, 0.1 * M_SQRT2 / 30.0, 2e-4);  // 0.1 m/s
 }
 
+TEST(Plant, ARobotThatHasMovedAndStandsWeighsWhatItDoesThere) {
+  Experiment e = experiment("puma_tilt");
+  plant::Plant plant(e.plant);
+  Payload payload = e.plant.payload;
+  const auto weighs = [&] {
+    plant.advance(plant.time() + 2'000'000'000);  // the sensor's filter has settled
+    plant.sample();
+    const plant::Truth& t = plant.truth();
+    const Wrench F_Po_I = gravityCompensation(
+        payload, t.P.X.R, staticWrench(payload, t.joints.q, t.P.X.R, e.plant.gravity));
+    return (t.F_Po_I - F_Po_I).stacked().norm() / F_Po_I.f.norm();
+  };
+  EXPECT_LT(weighs(), 1e-9);
+  ASSERT_TRUE(plant.moveRobot(RobotMove{1, e.plant.initial_joints(1) - 0.6, 1.0}));
+  EXPECT_LT(weighs(), 1e-9);
+  RigidBody load;
+  load.mass = 3.0;
+  load.p_BoBcm_B = {0.1, 0.0, 0.05};
+  ASSERT_TRUE(plant.moveRobot(Grasp{5, load}));  // no joint moves
+  payload.robot = withLoad(payload.robot, 5, load);
+  EXPECT_LT(weighs(), 1e-9);
+}
+
 TEST(Plant, JointsFollowAFifthOrderPolynomial) {
   Experiment e = experiment("puma_tilt");
   Plant plant(e.plant);
