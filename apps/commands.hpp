@@ -17,6 +17,7 @@ int identifyCommand(int argc, char** argv);
 int netftServerCommand(int argc, char** argv);
 int onBusCommand(int argc, char** argv);
 int plantCommand(int argc, char** argv);
+int platformCommand(int argc, char** argv);
 int plotCommand(int argc, char** argv);
 int replayCommand(int argc, char** argv);
 int reportCommand(int argc, char** argv);

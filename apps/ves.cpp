@@ -34,6 +34,8 @@ constexpr Command kCommands[] = {
     {"sweep", "one scenario over many values, on all cores, one row a run", sweepCommand},
     {"faults", "inject the faults of the table, say what was expected and what happened",
      faultsCommand},
+    {"platform", "joints, legs and limits of a Stewart platform, derived and in use",
+     platformCommand},
     {"robot", "what a robot description holds, and what of it moves", robotCommand},
     {"conform", "does the machine on the bus keep its side of it", conformCommand},
     {"on-bus", "any program on a private bus that --join reaches", onBusCommand},

@@ -55,7 +55,7 @@ TEST_F(Programs, BadInputIsOneLineAndStatusTwo) {
     EXPECT_EQ(o.status, 2) << arguments << ": " << o.text;
     EXPECT_EQ(std::count(o.text.begin(), o.text.end(), '\n'), 1) << arguments << ": " << o.text;
   }
-  EXPECT_NE(run("no_such_scenario").text.find("want one of alpha_sine, doss_on_table_4_1"),
+  EXPECT_NE(run("no_such_scenario").text.find("want one of alpha_sine, arm_on_desk"),
             std::string::npos);
 }
 

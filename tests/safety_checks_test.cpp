@@ -184,7 +184,7 @@ TEST(PathChecks, ConditionNumberIsTheFrobeniusOneOfTheJacobian) {
           Y.R = rotationOf(s * Vec3::Unit(k - 3)) * Y.R;
         return legLengths(g, Y);
       };
-      J.col(k) = (at(h) - at(-h)) / (2.0 * h);
+      J.col(k) = (at(h) - at(-h)) / (2.0 * h) / (k < 3 ? 1.0 : 0.55);  // the joints' circle
     }
     const Eigen::JacobiSVD<Mat6> svd(J);
     const Vec6 s = svd.singularValues();

@@ -92,7 +92,8 @@ Experiment build(const Value& document) {
   p.watchdog.park_after = readTime(watchdog, "park_after_s");
   p.watchdog.park_time = std::max<std::int64_t>(1, readTime(watchdog, "park_time_s"));
   watchdog.finish();
-  const Legs legs = readLegs(leg_section);
+  const WorkspaceUse use = readWorkspace(root.section("safety"), c.geometry);
+  const Legs legs = readLegs(leg_section, use);
   c.legs = legs.codec;
   out.machine = readMachine(root.section("machine"));
   if (root.has("bus")) {
@@ -120,7 +121,8 @@ Experiment build(const Value& document) {
     c.servo = withRecord(c.servo, record);
     c.compensation = withRecord(c.compensation, record);
   }
-  c.safety = readSafety(root.section("safety"), sensor.model.volts_per_count);
+  c.safety =
+      readSafety(root.section("safety"), c.geometry, use, legs, sensor.model.volts_per_count);
   const Base base = readBase(root.section("base"));
   c.admittance = base.modes;
   if (c.compensation.inertia && c.admittance.stiffness.size() > 0) {
@@ -167,11 +169,11 @@ Experiment build(const Value& document) {
   if (root.has("reality"))
     out.warnings.push_back("'reality' is called 'plant_mismatch' now; the old name will go");
   const Vec6 L = legLengths(p.geometry, p.geometry.fromHome(p.initial_pose));
-  if (L.minCoeff() < p.actuator.length_min || L.maxCoeff() > p.actuator.length_max)
-    root.fail(
-        "initial_pose",
-        fmt::format("takes legs of {:.4f} to {:.4f} m, want the stroke of {} to {} m", L.minCoeff(),
-                    L.maxCoeff(), p.actuator.length_min, p.actuator.length_max));
+  for (int i = 0; i < kLegs; ++i)
+    if (!(L(i) >= p.actuator.length_min && L(i) <= p.actuator.length_max))
+      root.fail("initial_pose",
+                fmt::format("takes leg {} to {:.4f} m, want the stroke of {:.4f} to {:.4f} m",
+                            i + 1, L(i), p.actuator.length_min, p.actuator.length_max));
 
   out.setup = setupOf(document);
   if (root.has("calibration")) {

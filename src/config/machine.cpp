@@ -7,7 +7,7 @@
 
 namespace ves {
 
-Legs readLegs(Section s) {
+Legs readLegs(Section s, const WorkspaceUse& use) {
   Legs legs;
   legs.gains.K_P = static_cast<int>(s.integer("K_P", 1, 1'000'000));
   legs.gains.K_D = static_cast<int>(s.integer("K_D", 0, 1'000'000));
@@ -17,18 +17,27 @@ Legs readLegs(Section s) {
   legs.actuator.gain_retract =
       s.number("gain_retract_in_per_s_per_ma", kTiny, 1e3) * kMetrePerInch * kPerMilliampere;
   legs.actuator.tau = s.number("tau_s", 1e-6, 1.0);
-  legs.actuator.length_min = s.number("stroke_min_m", 0.0, 10.0);
-  legs.actuator.length_max = s.number("stroke_max_m", legs.actuator.length_min, 10.0);
-  legs.transducer.offset = s.number("offset_m", 0.0, 10.0);
+  const Stroke stroke = derivedStroke(use);
+  legs.actuator.length_min = s.numberOr("stroke_min_m", 0.0, 20.0, stroke.min);
+  legs.actuator.length_max = s.numberOr("stroke_max_m", legs.actuator.length_min, 20.0, stroke.max);
   legs.transducer.scale = kMetrePerInch / s.number("counts_per_in", 1.0, 1e6);
-  const double reach =
-      legs.transducer.offset + legs.transducer.scale * plant::Temposonics::kMaxCount;
-  if (legs.actuator.length_min < legs.transducer.offset || legs.actuator.length_max > reach)
+  legs.transducer.offset = s.numberOr(
+      "offset_m", 0.0, 20.0,
+      derivedOffset({legs.actuator.length_min, legs.actuator.length_max}, legs.transducer.scale));
+  const double range = legs.transducer.scale * plant::Temposonics::kMaxCount,
+               length = legs.actuator.length_max - legs.actuator.length_min;
+  if (length > range)
+    s.fail("counts_per_in",
+           fmt::format("the stroke of {:.4f} m takes more than 14 bits, want at "
+                       "most {:.4g}",
+                       length, kMetrePerInch * plant::Temposonics::kMaxCount / length));
+  if (legs.actuator.length_min < legs.transducer.offset ||
+      legs.actuator.length_max > legs.transducer.offset + range)
     s.fail("offset_m",
-           fmt::format("the 14-bit transducer sees {:.4f} to {:.4f} m, the stroke is {} "
-                       "to {} m; want the stroke inside",
-                       legs.transducer.offset, reach, legs.actuator.length_min,
-                       legs.actuator.length_max));
+           fmt::format("the 14-bit transducer sees {:.4f} to {:.4f} m, the stroke is {:.4f} "
+                       "to {:.4f} m; want the stroke inside",
+                       legs.transducer.offset, legs.transducer.offset + range,
+                       legs.actuator.length_min, legs.actuator.length_max));
   legs.filters = s.choice("filters", {"none", "outputs"}) == "none" ? plant::LegFilters::kNone
                                                                     : plant::LegFilters::kOutputs;
   legs.filter_cutoff = s.number("filter_cutoff_rad_per_s", 1e-3, 1e6);

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "ves/config/platform.hpp"
+
 #include "readers.hpp"
 
 #include <fmt/format.h>
 
+#include "ves/analysis/platform.hpp"
 #include "ves/base/coordinates.hpp"
 #include "ves/math/dense.hpp"
 
@@ -61,23 +64,58 @@ RigidBody readBox(Section s) {
   return box;
 }
 
+/// Six points; with two coordinates each they lie in the plane of the plate, as in (2.18).
+std::array<Vec3, kLegs> readJoints(Section& s, const char* key) {
+  const Eigen::MatrixXd rows = s.matrix(key, kLegs, -1, -10.0, 10.0);
+  if (rows.cols() != 2 && rows.cols() != 3)
+    s.fail(key, fmt::format("has {} coordinates a joint, want x, y or x, y, z", rows.cols()));
+  std::array<Vec3, kLegs> out;
+  for (int i = 0; i < kLegs; ++i)
+    out[static_cast<std::size_t>(i)] = {rows(i, 0), rows(i, 1),
+                                        rows.cols() == 3 ? rows(i, 2) : 0.0};
+  return out;
+}
+
 Geometry readGeometry(Section s) {
   Geometry g;
-  const auto joints = [&](const char* key) {
-    const Eigen::MatrixXd xy = s.matrix(key, kLegs, 2, -10.0, 10.0);
-    std::array<Vec3, kLegs> out;
-    for (int i = 0; i < kLegs; ++i) out[static_cast<std::size_t>(i)] = {xy(i, 0), xy(i, 1), 0.0};
-    return out;
-  };
-  g.p_IBi_I = joints("base_joints_m");
-  g.p_PPi_P = joints("platform_joints_m");
+  g.p_IBi_I = readJoints(s, "base_joints_m");
+  g.p_PPi_P = readJoints(s, "platform_joints_m");
   g.home_height = s.number("home_height_m", 0.01, 10.0);
   s.finish();
-  const BodyMotion home{g.fromHome({}), {}, {}, {}, {}};
-  BodyMotion solved;
-  if (!forwardMotion(g, home.X, {legLengths(g, home.X), Vec6::Zero(), Vec6::Zero()}, solved))
+  const Transform home = g.fromHome({});
+  const LegSlope slope = flattestLeg(g, home);
+  if (!(slope.angle > 0.0))
+    s.fail("home_height_m", fmt::format("leg {} stands at {:.1f} deg to a plate at home, want more "
+                                        "than 0: the platform above the base",
+                                        slope.leg + 1, slope.angle / kDegree));
+  if (!(conditionNumber(g, home) < 1e9))
     s.fail("platform_joints_m", "the platform is singular at home: its legs cannot hold it");
   return g;
+}
+
+Platform loadPlatform(const std::filesystem::path& file,
+                      const std::vector<std::string>& overrides) {
+  Value document = loadDocument(file);
+  for (const std::string& assignment : overrides) applyOverride(document, assignment);
+  Section root(document, "");
+  Platform out;
+  out.geometry = readGeometry(root.section("platform"));
+  out.use = readWorkspace(root.section("safety"), out.geometry);
+  Section leg_section = root.section("legs");
+  leg_section.has("watchdog");
+  const Legs legs = readLegs(leg_section, out.use);
+  const double volts = root.section("sensor").number("volts_per_count", kTiny, 1.0);
+  out.limits = readSafety(root.section("safety"), out.geometry, out.use, legs, volts);
+  out.gains = legs.gains;
+  out.actuator = legs.actuator;
+  out.transducer = legs.transducer;
+  return out;
+}
+
+std::filesystem::path findPlatform(const std::string& name, const std::filesystem::path& config) {
+  const std::filesystem::path scenario = config / "scenarios" / (name + ".yaml");
+  return std::filesystem::exists(scenario) ? scenario
+                                           : findFile("platform", name, config / "platforms");
 }
 
 }  // namespace ves

@@ -6,6 +6,7 @@
 
 #include <cmath>
 
+#include "ves/analysis/platform.hpp"
 #include "ves/config/document.hpp"
 #include "ves/config/experiment.hpp"
 #include "ves/config/urdf.hpp"
@@ -37,7 +38,8 @@ struct Legs {
   double filter_cutoff = 0.0;
   LegCodec codec;
 };
-Legs readLegs(Section s);
+/// What is `derived` follows from what the workspace asks of the legs.
+Legs readLegs(Section s, const WorkspaceUse& use);
 
 /// sensor
 struct Sensor {
@@ -49,8 +51,11 @@ struct Sensor {
 };
 Sensor readSensor(Section s);
 
+/// safety.translation_m and rotation_deg, and what they ask of the legs
+WorkspaceUse readWorkspace(Section s, const Geometry& geometry);
 /// safety
-SafetyLimits readSafety(Section s, double volts_per_count);
+SafetyLimits readSafety(Section s, const Geometry& geometry, const WorkspaceUse& use,
+                        const Legs& legs, double volts_per_count);
 
 /// robot
 struct Robot {

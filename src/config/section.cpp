@@ -83,6 +83,14 @@ double Section::number(std::string_view key, double lo, double hi) {
   return toNumber(need(key), fmt::format("{}{}", path_.empty() ? "" : path_ + ".", key), lo, hi);
 }
 
+double Section::numberOr(std::string_view key, double lo, double hi, double derived) {
+  const Value& value = need(key);
+  if (value.kind != Value::Kind::kScalar || value.text != "derived") return number(key, lo, hi);
+  if (!(derived >= lo && derived <= hi))
+    fail(key, fmt::format("the derived value is {:.4g}, want {}", derived, interval(lo, hi)));
+  return derived;
+}
+
 std::int64_t Section::integer(std::string_view key, std::int64_t lo, std::int64_t hi) {
   const Value& value = need(key);
   std::int64_t x = 0;

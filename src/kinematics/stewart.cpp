@@ -137,12 +137,21 @@ ForwardSolution forwardPose(const Geometry& geometry, const Vec6& L, const Trans
   return solve(geometry, L, guess, near, 0.1);
 }
 
+double jointRadius(const Geometry& geometry) noexcept {
+  Vec3 middle = Vec3::Zero();
+  for (const Vec3& p : geometry.p_PPi_P) middle += p / kLegs;
+  double sum = 0.0;
+  for (const Vec3& p : geometry.p_PPi_P) sum += (p - middle).squaredNorm();
+  return std::sqrt(sum / kLegs);
+}
+
 double conditionNumber(const Geometry& geometry, const Transform& X_IP) noexcept {
+  const double radius = jointRadius(geometry);
   Mat6 J;
   for (int i = 0; i < kLegs; ++i) {
     const Leg l = leg(geometry, X_IP, i);
     const Vec3 along = l.d.normalized();
-    J.row(i) << along.transpose(), l.r.cross(along).transpose();
+    J.row(i) << along.transpose(), l.r.cross(along).transpose() / radius;
   }
   const Eigen::PartialPivLU<Mat6> lu(J);
   if (!regular(lu)) return HUGE_VAL;

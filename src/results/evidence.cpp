@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "ves/analysis/platform.hpp"
 #include "ves/base/coordinates.hpp"
 
 namespace ves {
@@ -34,23 +35,14 @@ std::string legsTooClose(const Row& row, const Experiment& e) {
   const Geometry& g = e.controller.geometry;
   const SafetyLimits& limits = e.controller.safety;
   const Transform X_IP = g.fromHome(Pose::from(Vec6::Map(row.state.x)));
-  double least = HUGE_VAL, flattest = HUGE_VAL;
-  std::size_t a = 0, b = 0, flat = 0;
-  for (std::size_t i = 0; i < kLegs; ++i) {
-    const Vec3 end = X_IP * g.p_PPi_P[i], along = (end - g.p_IBi_I[i]).normalized();
-    const double sine = std::min(along.z(), along.dot(X_IP.R.col(2)));
-    if (sine < flattest) flattest = sine, flat = i;
-    for (std::size_t j = i + 1; j < kLegs; ++j) {
-      const double d = segmentDistance(g.p_IBi_I[i], end, g.p_IBi_I[j], X_IP * g.p_PPi_P[j]);
-      if (d < least) least = d, a = i, b = j;
-    }
-  }
-  if (!(least >= limits.leg_clearance))
+  const LegGap gap = nearestLegs(g, X_IP);
+  if (!(gap.distance >= limits.leg_clearance))
     return fmt::format("legs {} and {} are {:.1f} mm apart, want {:.1f} (safety.leg_clearance_m)",
-                       a + 1, b + 1, least * 1e3, limits.leg_clearance * 1e3);
+                       gap.first + 1, gap.second + 1, gap.distance * 1e3,
+                       limits.leg_clearance * 1e3);
+  const LegSlope slope = flattestLeg(g, X_IP);
   return fmt::format("leg {} is {:.1f} deg from a plate, want {:.1f} (safety.plate_angle_deg)",
-                     flat + 1, std::asin(std::clamp(flattest, -1.0, 1.0)) / kDegree,
-                     limits.plate_angle / kDegree);
+                     slope.leg + 1, slope.angle / kDegree, limits.plate_angle / kDegree);
 }
 
 std::string legBehind(const Row& row, const SafetyLimits& limits) {

@@ -109,12 +109,12 @@
         mesh.material.color.setHSL(0.33 * Math.min(1, margin * 2), margin < 0.5 ? 0.6 : 0.12, 0.5);
       }
       const f = new THREE.Vector3(r.scalar(i, 'fx_dynamic'), r.scalar(i, 'fy_dynamic'), r.scalar(i, 'fz_dynamic'));
-      const length = f.length() / show.newtonsPerMetre;
-      this.force.visible = length > 0.02 && isFinite(length);
+      const size = r.scene.size, length = f.length() / show.newtonsPerMetre;
+      this.force.visible = length > 0.02 * size && isFinite(length);
       if (this.force.visible) {
         this.force.position.copy(this.frames.platform.position);
         this.force.setDirection(f.normalize());
-        this.force.setLength(Math.min(length, 3), 0.08, 0.05);
+        this.force.setLength(Math.min(length, 3 * size), 0.08 * size, 0.05 * size);
       }
       const points = r.scene.arm.map((p, k) =>
         new THREE.Vector3(...p).addScaledVector(new THREE.Vector3(...r.bent(i, k)), show.bending));
@@ -199,13 +199,17 @@
   grid.rotation.x = Math.PI / 2;
   world.add(grid);
   function look(view) {
-    const reach = Math.min(first.scene.reach, 3), target = new THREE.Vector3(0, 0, 0.8 * first.scene.home + 0.25 * reach);
-    let far = 2.6 + first.scene.home + 0.7 * reach;
+    const size = first.scene.size, reach = Math.min(first.scene.reach, 3 * size), target = new THREE.Vector3(0, 0, 0.8 * first.scene.home + 0.25 * reach);
+    let far = 2.6 * size + first.scene.home + 0.7 * reach;
     if (view === 'arm') {  // all of it
       const box = new THREE.Box3().setFromPoints(first.scene.arm.map(p => new THREE.Vector3(...p)));
       box.getCenter(target);
       far = 1.3 * box.getSize(new THREE.Vector3()).length();
     }
+    camera.near = 0.02 * far;
+    camera.far = 20 * far;
+    camera.updateProjectionMatrix();
+    grid.scale.setScalar(size);
     const from = {iso: [0.62, -0.95, 0.5], front: [0, -1.15, 0.02], side: [1.15, 0, 0.02], top: [0, -0.001, 1.2],
                   arm: [0.62, -0.95, 0.5]}[view];
     camera.position.set(target.x + far * from[0], target.y + far * from[1], target.z + far * from[2]);
@@ -308,7 +312,7 @@
   function show(i) {
     if (!first || !first.count) return;
     shown = Math.max(0, Math.min(first.count - 1, i));
-    const t = first.time(shown), newtonsPerMetre = 1000 / Math.pow(10, parseFloat(element('force').value));
+    const t = first.time(shown), newtonsPerMetre = 1000 * Math.pow(Math.min(first.scene.size, 1), 2) / Math.pow(10, parseFloat(element('force').value));
     const bending = parseFloat(element('bending').value);
     bodies.forEach((b, k) => b.place(k ? b.recording.at(t) : shown, {ghost: element('ghost').checked, newtonsPerMetre, bending}));
     const phase = nameOf('phases', first.scalar(shown, 'phase')), segment = first.scalar(shown, 'segment');
@@ -317,7 +321,7 @@
     const lines = [`${phase}${phase === 'running' && kind ? ': ' + kind : ''}${segment >= 0 && segment < first.scene.segments.length ? ` (${segment + 1} of ${first.scene.segments.length})` : ''}`];
     if (cause) lines.push(`stopped by: ${cause}`);
     if (asked) lines.push(asked < 2 ? 'stop requested' : 'stop requested from a browser, and taken');
-    lines.push(`force arrow: 1 m is ${Math.round(newtonsPerMetre)} N`);
+    lines.push(`force arrow: 1 m is ${newtonsPerMetre < 10 ? newtonsPerMetre.toFixed(1) : Math.round(newtonsPerMetre)} N`);
     if (first.scene.arm.length && bending > 1) lines.push(`arm's bending times ${bending}`);
     if (live && live.closed) lines.push('no connection: the run or its viewer has ended');
     const words = element('words'), head = document.createElement('b');

@@ -27,27 +27,45 @@ constexpr double kShortestLink = 1e-3;  // [m] worth drawing
 
 Json json(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
 
+/// Of the report's platform, to which the sizes above belong.
+constexpr double kJointRadius = 0.55;  // [m]
+
 /// Axes whose z points along a leg; how they are turned about it does not matter.
 Mat3 along(const Vec3& way) {
   return Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), way).toRotationMatrix();
 }
 
-Json capsule(const std::string& frame, const Vec3& from, const Vec3& to) {
+Json capsule(const std::string& frame, const Vec3& from, const Vec3& to, double radius) {
   return {{"kind", "capsule"},
           {"frame", frame},
           {"from", json(from)},
           {"to", json(to)},
-          {"radius", kLinkRadius}};
+          {"radius", radius}};
 }
 
-Json plate(const std::string& frame, const std::array<Vec3, kLegs>& corners, double top) {
+/// A plate at the joints' mean height, its corners in their order around it, and a post to each
+/// joint that is off it.
+void addPlate(Json& shapes, const std::string& frame, std::array<Vec3, kLegs> joints, double size) {
+  Vec3 middle = Vec3::Zero();
+  for (const Vec3& p : joints) middle += p / kLegs;
+  std::sort(joints.begin(), joints.end(), [&](const Vec3& a, const Vec3& b) {
+    return std::atan2(a.y() - middle.y(), a.x() - middle.x()) <
+           std::atan2(b.y() - middle.y(), b.x() - middle.x());
+  });
   Json points = Json::array();
-  for (const Vec3& p : corners) points.push_back({p.x(), p.y()});
-  return {{"kind", "plate"},
-          {"frame", frame},
-          {"corners", points},
-          {"top", top},
-          {"thickness", kPlate}};
+  for (const Vec3& p : joints) points.push_back({p.x(), p.y()});
+  shapes.push_back({{"kind", "plate"},
+                    {"frame", frame},
+                    {"corners", points},
+                    {"top", middle.z()},
+                    {"thickness", kPlate * size}});
+  for (const Vec3& p : joints)
+    if (std::abs(p.z() - middle.z()) > kPlate * size * 0.1)
+      shapes.push_back({{"kind", "cylinder"},
+                        {"frame", frame},
+                        {"from", {p.x(), p.y(), middle.z()}},
+                        {"length", p.z() - middle.z()},
+                        {"radius", kRodRadius * size}});
 }
 
 std::string linkFrame(int i) { return fmt::format("link{}", i + 1); }
@@ -56,17 +74,23 @@ std::string linkFrame(int i) { return fmt::format("link{}", i + 1); }
 
 Scene::Scene(const Experiment& e)
     : geometry_(e.plant.geometry),
+      size_(jointRadius(geometry_) / kJointRadius),
       payload_(e.plant.payload),
       arm_(e.arm.value_or(ArmShape())),
       Phi_(e.controller.admittance.Phi) {
   if (e.robot.tool()) tool_ = *e.robot.tool();
-  description_ = {{"name", e.name}, {"description", e.description}, {"home", geometry_.home_height},
-                  {"reach", 0.0},   {"frames", Json::array()},      {"shapes", Json::array()}};
+  description_ = {{"name", e.name},
+                  {"description", e.description},
+                  {"home", geometry_.home_height},
+                  {"size", size_},
+                  {"reach", 0.0},
+                  {"frames", Json::array()},
+                  {"shapes", Json::array()}};
   Json& shapes = description_["shapes"];
   addFrame("platform", "");
   addFrame("base", "");  // where the base in free space would be
-  shapes.push_back(plate("", geometry_.p_IBi_I, 0.0));
-  shapes.push_back(plate("platform", geometry_.p_PPi_P, 0.0));
+  addPlate(shapes, "", geometry_.p_IBi_I, size_);
+  addPlate(shapes, "platform", geometry_.p_PPi_P, size_);
   const double length = e.plant.actuator.length_min;
   for (int i = 0; i < kLegs; ++i) {
     const std::string leg = fmt::format("leg{}", i + 1), rod = fmt::format("rod{}", i + 1);
@@ -75,17 +99,17 @@ Scene::Scene(const Experiment& e)
     shapes.push_back({{"kind", "cylinder"},
                       {"frame", leg},
                       {"length", 0.85 * length},
-                      {"radius", 2.0 * kRodRadius},
+                      {"radius", 2.0 * kRodRadius * size_},
                       {"leg", i}});
     shapes.push_back({{"kind", "cylinder"},
                       {"frame", rod},
                       {"length", -length},
-                      {"radius", kRodRadius},
+                      {"radius", kRodRadius * size_},
                       {"leg", i}});
   }
   shapes.push_back({{"kind", "cylinder"},
                     {"frame", "platform"},
-                    {"radius", 0.08},
+                    {"radius", 0.08 * carriedSize()},
                     {"length", payload_.X_PS.p.z()}});
   if (!e.robot.frames.empty()) addRobot(e.robot);
   addArm();
@@ -150,13 +174,14 @@ void Scene::addFrame(const std::string& name, const std::string& parent) {
 /// What its description shows; of links without, capsules from joint to joint and to the tool.
 void Scene::addRobot(const UrdfRobot& description) {
   const RobotModel& robot = payload_.robot;
+  const double carried = carriedSize(), radius = kLinkRadius * carried;
   Json& shapes = description_["shapes"];
   const Transform X_PL0 = payload_.X_PL0();
   shapes.push_back({{"kind", "cylinder"},
                     {"frame", "platform"},
                     {"from", json(payload_.X_PR.p)},
                     {"length", X_PL0.p.z() - payload_.X_PR.p.z()},
-                    {"radius", 0.2}});
+                    {"radius", 0.2 * carried}});
   for (int i = 0; i < robot.size; ++i) addFrame(linkFrame(i), "platform");
   const std::set<int> seen = addVisuals(description);
   for (int i = 0; i < robot.size; ++i) {
@@ -164,9 +189,9 @@ void Scene::addRobot(const UrdfRobot& description) {
     const Vec3 joint = link.X_parent.p;
     if (!(joint.norm() > kShortestLink) || seen.count(link.parent)) continue;
     if (link.parent < 0)
-      shapes.push_back(capsule("platform", X_PL0.p, X_PL0 * joint));
+      shapes.push_back(capsule("platform", X_PL0.p, X_PL0 * joint, radius));
     else
-      shapes.push_back(capsule(linkFrame(link.parent), Vec3::Zero(), joint));
+      shapes.push_back(capsule(linkFrame(link.parent), Vec3::Zero(), joint, radius));
   }
   double reach = tool_ ? tool_->X_link.p.norm() : 0.0;
   for (int i = 0; i < robot.size; ++i) reach += robot.link(i).X_parent.p.norm();
@@ -174,8 +199,8 @@ void Scene::addRobot(const UrdfRobot& description) {
   if (!tool_) return;
   addFrame("tool", "platform");
   if (tool_->link >= 0 && !seen.count(tool_->link) && tool_->X_link.p.norm() > kShortestLink)
-    shapes.push_back(capsule(linkFrame(tool_->link), Vec3::Zero(), tool_->X_link.p));
-  shapes.push_back({{"kind", "axes"}, {"frame", "tool"}, {"size", 0.15}});
+    shapes.push_back(capsule(linkFrame(tool_->link), Vec3::Zero(), tool_->X_link.p, radius));
+  shapes.push_back({{"kind", "axes"}, {"frame", "tool"}, {"size", 0.15 * carried}});
 }
 
 /// Returns the links that are drawn: -1 is link 0.
@@ -236,7 +261,7 @@ void Scene::addArm() {
   const Transform X_IP = geometry_.fromHome(Pose());
   for (const Vec3& p : arm_.points) points.push_back(json(X_IP * p));
   description_["arm"] = points;
-  description_["arm_radius"] = kArmRadius;
+  description_["arm_radius"] = kArmRadius * size_;
 }
 
 std::vector<float> Scene::picture(const Row& row, const std::optional<Vec6>& base) const {

@@ -74,6 +74,8 @@ class Section {
 
   /// A number in [lo, hi]; NaN is in no interval.
   double number(std::string_view key, double lo, double hi);
+  /// The same, or the word `derived`, which stands for the value that follows from elsewhere.
+  double numberOr(std::string_view key, double lo, double hi, double derived);
   std::int64_t integer(std::string_view key, std::int64_t lo, std::int64_t hi);
   bool flag(std::string_view key);
   std::string text(std::string_view key);

@@ -87,8 +87,12 @@ struct JacobianFactors {
 ForwardSolution forwardPose(const Geometry& geometry, const Vec6& L, const Transform& guess,
                             JacobianFactors& near) noexcept;
 
+/// [m] root mean square distance of the platform's joints from their middle: how large it is.
+double jointRadius(const Geometry& geometry) noexcept;
+
 /// |J| |J^-1| / 6 in the Frobenius norm, of the Jacobian from twists to leg rates with lengths
-/// counted in metres: 1 at best, infinite where the legs cannot hold the platform.
+/// counted in jointRadius(), the same for platforms of one shape: 1 at best, infinite where the
+/// legs cannot hold it.
 double conditionNumber(const Geometry& geometry, const Transform& X_IP) noexcept;
 
 /// Rate (2.24) and acceleration (2.32) of P at the pose X_IP. Where (2.30) to (2.32) print only the

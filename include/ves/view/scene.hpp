@@ -21,8 +21,9 @@ class Scene {
   explicit Scene(const Experiment& experiment);
 
   /// What stays: "name", "frames" (name and parent of each, in the order of a picture's poses),
-  /// "shapes" (kind, frame, sizes [m]), "arm" (the line of the arm at rest, in I [m]), "arm_radius"
-  /// [m], "scalars" (names), "phases", "segments", "checks".
+  /// "size" [-] beside the report's platform, "shapes" (kind, frame, sizes [m]), "arm" (the line of
+  /// the arm at rest, in I [m]), "arm_radius" [m], "scalars" (names), "phases", "segments",
+  /// "checks".
   const nlohmann::ordered_json& description() const { return description_; }
   /// Meshes that are not drawn, and why.
   const std::vector<std::string>& warnings() const { return warnings_; }
@@ -40,12 +41,15 @@ class Scene {
   void addRobot(const UrdfRobot& robot);
   std::set<int> addVisuals(const UrdfRobot& robot);
   void addArm();
+  /// A large platform's robot and sensor are no larger.
+  double carriedSize() const { return std::min(size_, 1.0); }
 
   struct Scalar {
     std::string name;
     std::function<double(const Row&)> value;
   };
   Geometry geometry_;
+  double size_;  // [-] of the platform, the report's being 1
   Payload payload_;
   std::optional<NamedFrame> tool_;
   ArmShape arm_;         // without points: none

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/analysis/platform.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "ves/plant/nominal_servo.hpp"
+
+namespace ves {
+namespace {
+
+Vec3 legAxis(const Geometry& g, const Transform& X_IP, std::size_t i) {
+  return (X_IP * g.p_PPi_P[i] - g.p_IBi_I[i]).normalized();
+}
+
+double angleBetween(const Vec3& a, const Vec3& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b));
+}
+
+/// The first check of a pose that fails; kCount when none does.
+Check failing(const Geometry& g, const SafetyLimits& limits, const JointAxes& axes,
+              const Transform& X_IP) {
+  Tripped tripped;
+  tripped.require(Check::kActuatorLimits, actuatorLimitsCheck(limits, legLengths(g, X_IP)));
+  tripped.require(Check::kJointLimits, axes.check(limits, g, X_IP));
+  tripped.require(Check::kCollide, collideCheck(limits, g, X_IP));
+  tripped.require(Check::kConditioning, conditioningCheck(limits, g, X_IP));
+  return tripped.first();
+}
+
+}  // namespace
+
+LegGap nearestLegs(const Geometry& g, const Transform& X_IP) {
+  LegGap out;
+  out.distance = HUGE_VAL;
+  for (int i = 0; i < kLegs; ++i)
+    for (int j = i + 1; j < kLegs; ++j) {
+      const auto a = static_cast<std::size_t>(i), b = static_cast<std::size_t>(j);
+      const double d =
+          segmentDistance(g.p_IBi_I[a], X_IP * g.p_PPi_P[a], g.p_IBi_I[b], X_IP * g.p_PPi_P[b]);
+      if (d < out.distance) out = {i, j, d};
+    }
+  return out;
+}
+
+LegSlope flattestLeg(const Geometry& g, const Transform& X_IP) {
+  LegSlope out;
+  out.angle = HUGE_VAL;
+  for (int i = 0; i < kLegs; ++i) {
+    const Vec3 along = legAxis(g, X_IP, static_cast<std::size_t>(i));
+    const double sine = std::min(along.z(), along.dot(X_IP.R.col(2)));
+    const double angle = std::asin(std::clamp(sine, -1.0, 1.0));
+    if (angle < out.angle) out = {i, angle};
+  }
+  return out;
+}
+
+double largestJointAngle(const Geometry& g, const Transform& X_IP) {
+  const Transform home = g.fromHome({});
+  double most = 0.0;
+  for (std::size_t i = 0; i < kLegs; ++i) {
+    const Vec3 rest = legAxis(g, home, i), now = legAxis(g, X_IP, i);
+    most = std::max(
+        {most, angleBetween(rest, now), angleBetween(X_IP.R * home.R.transpose() * rest, now)});
+  }
+  return most;
+}
+
+WorkspaceUse workspaceUse(const Geometry& g, double translation, double rotation) {
+  WorkspaceUse use;
+  use.leg_least.setConstant(HUGE_VAL);
+  use.clearance = use.plate_angle = HUGE_VAL;
+  const auto look = [&](const Vec6& x) {
+    const Transform X_IP = g.fromHome(Pose::from(x));
+    const Vec6 L = legLengths(g, X_IP);
+    use.leg_least = use.leg_least.cwiseMin(L);
+    use.leg_most = use.leg_most.cwiseMax(L);
+    use.joint_angle = std::max(use.joint_angle, largestJointAngle(g, X_IP));
+    use.clearance = std::min(use.clearance, nearestLegs(g, X_IP).distance);
+    use.plate_angle = std::min(use.plate_angle, flattestLeg(g, X_IP).angle);
+    use.condition = std::max(use.condition, conditionNumber(g, X_IP));
+  };
+  look(Vec6::Zero());
+  Vec6 farthest;
+  farthest << Vec3::Constant(translation), Vec3::Constant(rotation);
+  for (int i = 0; i < 6; ++i)
+    for (const double sign : {-1.0, 1.0}) look(sign * farthest(i) * Vec6::Unit(i));
+  for (int corner = 0; corner < 64; ++corner) {
+    Vec6 x = 0.5 * farthest;
+    for (int i = 0; i < 6; ++i)
+      if (corner >> i & 1) x(i) = -x(i);
+    look(x);
+  }
+  return use;
+}
+
+Stroke derivedStroke(const WorkspaceUse& use) {
+  constexpr double kSpare = 0.05;  // [-]
+  const double least = use.leg_least.minCoeff(), most = use.leg_most.maxCoeff();
+  return {least - kSpare * (most - least), most + kSpare * (most - least)};
+}
+
+double derivedOffset(const Stroke& stroke, double metre_per_count) {
+  const double range = metre_per_count * plant::Temposonics::kMaxCount;
+  return std::max(0.0, 0.5 * (stroke.min + stroke.max - range));
+}
+
+SafetyLimits derivedLimits(const WorkspaceUse& use, const plant::LegSlaveGains& gains,
+                           const plant::ActuatorModel& actuator,
+                           const plant::Temposonics& transducer) {
+  const double stroke = actuator.length_max - actuator.length_min;
+  const double slowest =
+      velocityGain(std::min(actuator.gain_extend, actuator.gain_retract), gains, transducer);
+  SafetyLimits l;
+  l.leg_min = actuator.length_min + 0.03 * stroke;
+  l.leg_max = actuator.length_max - 0.03 * stroke;
+  l.joint_cone = std::min(M_PI, use.joint_angle + 5.0 * kDegree);
+  l.leg_clearance = 0.8 * use.clearance;
+  l.plate_angle = 0.8 * use.plate_angle;
+  l.condition = 1.5 * use.condition;
+  l.leg_velocity = 0.95 * slowest * servoRail(gains, transducer);
+  l.position_error = 1.5 * l.leg_velocity / slowest;
+  l.position_error_still = 0.015 * stroke;
+  l.position_error_lag = 1.35 / slowest;
+  l.reading_jump = 0.003 * stroke;
+  return l;
+}
+
+Travel travel(const Geometry& g, const SafetyLimits& limits, int coordinate, double sign,
+              double farthest) {
+  const JointAxes axes(g);
+  const auto at = [&](double distance) {
+    const Vec6 x = sign * distance * Vec6::Unit(coordinate);
+    return failing(g, limits, axes, g.fromHome(Pose::from(x)));
+  };
+  constexpr int kSteps = 200, kHalvings = 30;
+  double good = 0.0;
+  for (int i = 0; i <= kSteps; ++i) {
+    double bad = farthest * i / kSteps;
+    Check ends = at(bad);
+    if (ends == Check::kCount) {
+      good = bad;
+      continue;
+    }
+    for (int k = 0; k < kHalvings && i > 0; ++k) {
+      const double middle = 0.5 * (good + bad);
+      const Check here = at(middle);
+      if (here == Check::kCount)
+        good = middle;
+      else
+        bad = middle, ends = here;
+    }
+    return {good, ends};
+  }
+  return {farthest, Check::kMotionLimits};
+}
+
+}  // namespace ves
