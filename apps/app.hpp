@@ -141,13 +141,9 @@ struct Options {
 };
 
 /// Says that admittance control would diverge, and refuses a program that has it.
-inline void requireStability(Experiment& experiment) {
-  const std::string why = applyStabilityCheck(experiment);
-  if (why.empty()) return;
-  if (wantsAdmittance(experiment.controller.program) &&
-      experiment.controller.stability != Stability::kForced)
-    throw InputError(fmt::format("{}: {}; --force runs it all the same", experiment.name, why));
-  fmt::print(stderr, "warning: {}\n", why);
+inline void warnOfInstability(Experiment& experiment) {
+  const std::string why = requireStability(experiment);
+  if (!why.empty()) fmt::print(stderr, "warning: {}\n", why);
 }
 
 /// Asks a command for the words that may be completed.

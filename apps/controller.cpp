@@ -22,7 +22,7 @@ int serve(ControllerOptions& options) {
   catchSignals();
   Experiment experiment = options.load();
   if (options.process.start) {
-    requireStability(experiment);
+    warnOfInstability(experiment);
   } else {
     const std::string why = applyStabilityCheck(experiment);
     if (!why.empty()) fmt::print(stderr, "ves controller: {}\n", why);

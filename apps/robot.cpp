@@ -9,15 +9,6 @@
 namespace ves::app {
 namespace {
 
-/// "robot" of a file: a URDF, or a robot's YAML.
-Value robotDocument(const std::string& file, const std::vector<std::string>& sets) {
-  Value document = parseDocument("{}", file);
-  const bool urdf = std::filesystem::path(file).extension() == ".urdf";
-  applyOverride(document, fmt::format("robot.{}={}", urdf ? "urdf" : "from", file));
-  for (const std::string& one : sets) applyOverride(document, "robot." + one);
-  return document;
-}
-
 void printJoints(const UrdfRobot& robot, const JointVector& q) {
   const RobotModel& model = robot.model;
   for (int i = 0; i < model.joints; ++i) {
@@ -69,17 +60,11 @@ int robotCommand(int argc, char** argv) {
   cli.add_option("--set", sets, "tip=LINK, joints=[..], lock.JOINT=VALUE (deg or m)")
       ->allow_extra_args(false);
   return run(cli, argc, argv, [&] {
-    const Value document = robotDocument(file, sets);
-    const Value& value = *document.find("robot");
-    Section s(value, "robot");
-    const Value* text = value.find("urdf_text");
-    if (!text) s.fail("urdf", "missing, want the robot's URDF file");
-    const UrdfRobot robot = chosenRobot(s, UrdfTree(text->text, *text->file));
-    const JointVector q = initialJoints(s, robot);
+    const auto [described, robot, q] = loadRobot(file, sets);
     const RigidBody all = compositeBody(robot.model, q);
     const Vec3 moments = symmetricEigenvalues(all.I_Bcm_B);
     const Vec3& c = all.p_BoBcm_B;
-    fmt::print("{}: {} of {} links move by {} joints\n\n", *text->file, robot.model.size,
+    fmt::print("{}: {} of {} links move by {} joints\n\n", described, robot.model.size,
                robot.frames.size(), robot.model.joints);
     printJoints(robot, q);
     fmt::print(

@@ -96,7 +96,7 @@ inline int runExperiment(RunnerOptions& options) {
     throw InputError("--view: a run in lockstep is over too soon; want ves view LOG afterwards");
   Experiment experiment = options.load();
   printWarnings(experiment, options.verbose);
-  requireStability(experiment);
+  warnOfInstability(experiment);
   LaunchOptions launch = prepareFolder(options, experiment);
   catchSignals();
 

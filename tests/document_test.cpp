@@ -24,6 +24,26 @@ std::string parsed(const std::string& text) {
   return refusal([&] { parseDocument(text, "a.yaml"); });
 }
 
+// `from` and `urdf` of a file that an override names, and of the file that that one names.
+TEST(Document, AnOverrideMayNameAFileOfManyKeys) {
+  for (const std::string name : {"puma560", "doss", "desk_arm"}) {
+    const std::string file = test::configDir() + "/robots/" + name + ".yaml";
+    Value v = parseDocument("robot: {urdf_text: old, lock: {a: 1}}", "a.yaml");
+    applyOverride(v, "robot.from=" + file);
+    const Value whole = loadDocument(file), &robot = *v.find("robot");
+    EXPECT_GT(whole.keys.size(), 4u);
+    for (const std::string& key : whole.keys) {
+      ASSERT_NE(robot.find(key), nullptr) << key;
+      EXPECT_EQ(emit(*robot.find(key)), emit(*whole.find(key))) << key;
+    }
+    EXPECT_NE(robot.find("lock"), nullptr);
+    EXPECT_EQ(loadRobot(file, {}).robot.model.joints, name == "doss"      ? 7
+                                                      : name == "puma560" ? 6
+                                                                          : 3)
+        << name;
+  }
+}
+
 TEST(Document, IsUtf8) {
   EXPECT_EQ(parsed("a: gr\xc3\xbc\xc3\x9f \xe2\x82\xac \xf0\x9f\xa6\xbe\n"), "");
   for (const char* bad : {"\xff", "\xc3", "\xc0\xaf", "\xe0\x80\x80", "\xed\xa0\x80",

@@ -315,7 +315,8 @@ void applyOverride(Value& document, const std::string& assignment) {
   if (at->kind != Value::Kind::kMap) *at = map;
   map.put(keys.back(), std::move(leaf));
   resolve(map, std::filesystem::current_path(), 0);  // from, urdf: beside where it was typed
-  at->put(map.keys[0], std::move(map.children[0]));
+  for (std::size_t i = 0; i < map.keys.size(); ++i)  // `from` brings many
+    at->put(map.keys[i], std::move(map.children[i]));
 }
 
 std::string fingerprint(const std::string& text) {

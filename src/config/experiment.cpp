@@ -248,6 +248,15 @@ std::string applyStabilityCheck(Experiment& e) {
   return why;
 }
 
+std::string requireStability(Experiment& e) {
+  const std::string why = applyStabilityCheck(e);
+  if (!why.empty() && wantsAdmittance(e.controller.program) &&
+      e.controller.stability != Stability::kForced)
+    throw InputError(fmt::format(
+        "{}: {}; --force (controller.stability=forced) runs it all the same", e.name, why));
+  return why;
+}
+
 Interaction interactionOf(const Experiment& experiment, std::int64_t& duration) {
   const Program& program = experiment.controller.program;
   const int segment = admittanceSegment(program);

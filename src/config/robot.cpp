@@ -127,4 +127,20 @@ Robot readRobot(Section s, const Value& document) {
   return robot;
 }
 
+LoadedRobot loadRobot(const std::string& file, const std::vector<std::string>& overrides) {
+  Value document = parseDocument("{}", file);
+  const bool urdf = std::filesystem::path(file).extension() == ".urdf";
+  applyOverride(document, fmt::format("robot.{}={}", urdf ? "urdf" : "from", file));
+  for (const std::string& one : overrides) applyOverride(document, "robot." + one);
+  const Value& value = *document.find("robot");
+  Section s(value, "robot");
+  const Value* text = value.find("urdf_text");
+  if (!text) s.fail("urdf", "missing, want the robot's URDF file");
+  LoadedRobot out;
+  out.file = *text->file;
+  out.robot = chosenRobot(s, UrdfTree(text->text, out.file));
+  out.q = initialJoints(s, out.robot);
+  return out;
+}
+
 }  // namespace ves

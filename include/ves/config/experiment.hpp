@@ -40,7 +40,7 @@ struct MachineConfig {
   Source switches = Source::kSimulated;
   NetFtAddress net_ft;
   std::int64_t period = 0;  // [ns] between samples, in real time
-  double follow = 0.0;  // [1/s] bandwidth at which simulated pieces follow real legs and joints
+  double follow = 0.0;      // [1/s] bandwidth at which simulated pieces follow real legs and joints
 
   bool simulated() const {
     for (const Source s : {legs, force_sensor, robot, switches})
@@ -88,6 +88,10 @@ Experiment parseExperiment(const std::string& resolved, const std::string& name)
 /// controller and its resolved text. Without it admittance control is refused. Returns the
 /// explanation where the loop would diverge; empty when all is well.
 std::string applyStabilityCheck(Experiment& experiment);
+
+/// The same; throws InputError where the program wants admittance control that would diverge, and
+/// nobody forces it.
+std::string requireStability(Experiment& experiment);
 
 /// Robot and base of the program's first admittance segment, from its start, for the simulation of
 /// chapter 3; `duration` [ns] of the segment. Throws InputError when there is none.

@@ -106,6 +106,16 @@ UrdfRobot chosenRobot(Section& s, const UrdfTree& tree);
 /// limit next to it.
 JointVector initialJoints(Section& s, const UrdfRobot& robot);
 
+/// A robot alone, without a platform.
+struct LoadedRobot {
+  std::string file;  // of the description
+  UrdfRobot robot;
+  JointVector q = JointVector::Zero();  // [rad | m] where its joints begin
+};
+/// Reads a URDF, or a robot's YAML as in config/robots; `overrides` are "key=value" of it (tip,
+/// joints, lock.JOINT). Throws InputError.
+LoadedRobot loadRobot(const std::string& file, const std::vector<std::string>& overrides);
+
 /// The robot in which all joints move.
 UrdfRobot loadUrdf(const std::string& text, const std::string& file);
 
