@@ -81,10 +81,15 @@ inline void catchSignals() {
   sigaction(SIGPIPE, &action, nullptr);
 }
 
-/// Where bases, robots and scenarios are.
+/// Where bases, robots and scenarios are: as VES_CONFIG_DIR says, here, or beside the installed
+/// program.
 inline std::filesystem::path configFolder() {
-  const char* given = std::getenv("VES_CONFIG_DIR");
-  return given ? given : "config";
+  if (const char* given = std::getenv("VES_CONFIG_DIR")) return given;
+  std::error_code error;
+  const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
+  const auto installed = program.parent_path().parent_path() / "share/ves/config";
+  const bool here = std::filesystem::exists("config/ves.yaml", error);
+  return here || !std::filesystem::exists(installed, error) ? "config" : installed;
 }
 
 /// Which experiment, and on which bus.
@@ -151,11 +156,11 @@ inline constexpr const char* kWords = "--words";
 
 inline void printWords(const CLI::App& cli) {
   for (const CLI::App* sub : cli.get_subcommands(nullptr)) {
-    fmt::print("{} ", sub->get_name());
+    std::cout << sub->get_name() << " ";
     printWords(*sub);
   }
   for (const CLI::Option* option : cli.get_options())
-    for (const std::string& name : option->get_lnames()) fmt::print("--{} ", name);
+    for (const std::string& name : option->get_lnames()) std::cout << "--" << name << " ";
 }
 
 /// Why a run of the controller is no success: "not armed: ..." or "stopped by ..."; else empty.

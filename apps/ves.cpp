@@ -44,10 +44,25 @@ constexpr Command kCommands[] = {
      doctorCommand},
 };
 
-int call(const Command& command, std::string option) {
+/// What the command prints on that option.
+std::string printed(const Command& command, std::string option) {
   std::string name = command.name;
   char* argv[] = {name.data(), option.data(), nullptr};
-  return command.run(2, argv);
+  std::ostringstream out;
+  std::streambuf* const before = std::cout.rdbuf(out.rdbuf());
+  command.run(2, argv);
+  std::cout.rdbuf(before);
+  return out.str();
+}
+
+/// Text of a manual page: no character of it is a request.
+std::string forTroff(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    if ((c == '.' || c == '\'') && (out.empty() || out.back() == '\n')) out += "\\&";
+    out += c == '\\' ? "\\e" : c == '-' ? "\\-" : std::string(1, c);
+  }
+  return out;
 }
 
 /// For bash: eval "$(ves completion)".
@@ -56,17 +71,15 @@ void printCompletion() {
       "_ves() {{\n  local words cur=${{COMP_WORDS[COMP_CWORD]}} command=${{COMP_WORDS[1]}}\n"
       "  if ((COMP_CWORD == 1)); then\n    words='");
   for (const Command& c : kCommands) fmt::print("{} ", c.name);
-  fmt::print("test fuzz bench help'\n  else\n    case $command in\n");
-  for (const Command& c : kCommands) {
-    fmt::print("      {}) words='", c.name);
-    std::fflush(stdout);
-    call(c, kWords);
-    fmt::print("' ;;\n");
-  }
+  fmt::print("test fuzz bench python lessons package help'\n  else\n    case $command in\n");
+  for (const Command& c : kCommands)
+    fmt::print("      {}) words='{}' ;;\n", c.name, printed(c, kWords));
   fmt::print(
       "    esac\n"
       "    case $command in run | controller | plant | sweep | stability | identify | srms)\n"
-      "      words+=\" $(cd \"${{VES_CONFIG_DIR-config}}/scenarios\" 2>/dev/null && "
+      "      local folder=${{VES_CONFIG_DIR-config}}\n"
+      "      [[ -d $folder/scenarios ]] || folder=/usr/share/ves/config\n"
+      "      words+=\" $(cd \"$folder/scenarios\" 2>/dev/null && "
       "printf '%s ' *.yaml | sed 's/\\.yaml//g')\" ;;\n"
       "    esac\n"
       "  fi\n  COMPREPLY=($(compgen -W \"$words\" -- \"$cur\"))\n"
@@ -82,10 +95,10 @@ void printManual() {
       ".SH SYNOPSIS\n.B ves\n.I COMMAND\n.RI [ ARGUMENT ...]\n.SH COMMANDS\n",
       describeBuild());
   for (const Command& c : kCommands) {
-    fmt::print(".SS {}\n.nf\n", c.name);
-    std::fflush(stdout);
-    call(c, "--help");
-    fmt::print(".fi\n");
+    const std::string help = printed(c, "--help");
+    const std::size_t usage = help.find("Usage");
+    fmt::print(".SS {}\n{}.PP\n.nf\n{}.fi\n", forTroff(c.name), forTroff(help.substr(0, usage)),
+               forTroff(help.substr(usage)));
   }
   fmt::print(
       ".SH EXIT STATUS\n0: done. 1: a check stopped the run, or a comparison failed. 2: bad "
