@@ -7,13 +7,15 @@
 #include "ves/view/live_run.hpp"
 #include "ves/view/page.hpp"
 #include "ves/view/scene.hpp"
+#include "ves/view/still.hpp"
 
 namespace ves::app {
 namespace {
 
 struct ViewOptions {
   std::vector<std::string> logs;
-  std::string html;
+  std::string html, svg;
+  MovingOptions moving{0.0, 1e9, 8.0};
   std::optional<double> rate;
   std::string url = kDefaultUrl, join, address = "127.0.0.1";
   std::optional<int> port;
@@ -38,6 +40,17 @@ int writePage(const ViewOptions& options) {
   writeGiven("--html", options.html, text);
   fmt::print("{} ({:.1f} MB): open it in a browser\n", options.html,
              static_cast<double>(text.size()) * 1e-6);
+  return kDone;
+}
+
+int writeMoving(const ViewOptions& options) {
+  const Series series = readSeries(options.logs.front());
+  printDamage(series.damage);
+  MovingOptions how = options.moving;
+  how.rate = options.rate.value_or(how.rate);
+  const std::string text = moving(series, how);
+  writeGiven("--svg", options.svg, text);
+  fmt::print("{} ({:.0f} kB)\n", options.svg, static_cast<double>(text.size()) * 1e-3);
   return kDone;
 }
 
@@ -92,8 +105,15 @@ int viewCommand(int argc, char** argv) {
       ->expected(0, 2);
   auto* html = cli.add_option("--html", options.html,
                               "write one file that a browser opens from disk, and serve nothing");
+  auto* svg =
+      cli.add_option("--svg", options.svg, "write a drawing that moves, for a page or a README")
+          ->excludes(html);
+  cli.add_option("--from", options.moving.from, "[s] of the log, for --svg")
+      ->check(inRange(0.0, 1e9))
+      ->needs(svg);
+  cli.add_option("--to", options.moving.to, "[s]")->check(inRange(0.0, 1e9))->needs(svg);
   cli.add_option("--rate", options.rate,
-                 "[1/s] pictures of a log; 60 in a file, every tick in a browser")
+                 "[1/s] pictures of a log; 60 in a file, 8 in a drawing, every tick in a browser")
       ->check(inRange(0.1, 1000.0));
   addUrl(cli, options.url);
   addJoin(cli, options.join);
@@ -103,8 +123,10 @@ int viewCommand(int argc, char** argv) {
       ->capture_default_str();
   cli.add_option("--listener", options.listener)->group("");  // for ves run --view
   return run(cli, argc, argv, [&] {
-    if (html->count() == 0) return servePage(options);
-    if (options.logs.empty()) throw InputError("--html: want a log");
+    if (html->count() + svg->count() == 0) return servePage(options);
+    if (options.logs.empty() || (svg->count() > 0 && options.logs.size() > 1))
+      throw InputError(svg->count() > 0 ? "--svg: want one log" : "--html: want a log");
+    if (svg->count() > 0) return writeMoving(options);
     return writePage(options);
   });
 }

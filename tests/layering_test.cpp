@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Holds the module diagram of the README: who may include whom, and what the control path is free
-// of.
+// Holds the module diagram of docs/architecture.md: who may include whom, and what the control path
+// is free of.
 #include <gtest/gtest.h>
 
 #include <filesystem>

@@ -289,7 +289,7 @@ TEST(Still, IsADrawingOfEveryBody) {
   const std::string platform = stillAtStart(e, StillView::kPlatform),
                     arm = stillAtStart(e, StillView::kArm);
   EXPECT_EQ(count(platform, "<polygon"), 2u);  // two plates
-  EXPECT_EQ(count(arm, "<line"), count(platform, "<line") + 21u);
+  EXPECT_EQ(count(arm, "<polyline"), count(platform, "<polyline") + 21u);
   EXPECT_EQ(count(platform, "nan"), 0u);
   // What is seen of the arm is larger: by its length, 15 m.
   const auto width = [](const std::string& svg) {
@@ -299,6 +299,40 @@ TEST(Still, IsADrawingOfEveryBody) {
   };
   EXPECT_LT(width(platform), 5.0);
   EXPECT_GT(width(arm), 7.0);
+}
+
+// Every drawing shows the joints of the platform where the log says that they were.
+TEST(Moving, FollowsTheRun) {
+  const RecordedRun run = puma();
+  const double from = 1.0, to = 5.0, rate = 4.0;
+  const std::string svg = moving(run.series, {from, to, rate});
+  EXPECT_NE(svg.find("dur=\"4s\""), std::string::npos);
+  EXPECT_EQ(svg.find("nan"), std::string::npos);
+  // The platform's plate is the second polygon of the scene, which moves; the base's does not.
+  const std::size_t polygon = svg.find("<polygon"),
+                    animate = svg.find("<animate", svg.rfind("<polygon"));
+  ASSERT_NE(polygon, std::string::npos);
+  ASSERT_NE(animate, std::string::npos);
+  const std::size_t begin = svg.find("values=\"", animate) + 8;
+  std::istringstream drawings(svg.substr(begin, svg.find('"', begin) - begin));
+  const Vec3 eye = Vec3(0.62, -0.95, 0.5).normalized();
+  const Vec3 right = Vec3(-eye.y(), eye.x(), 0.0).normalized(), up = eye.cross(right);
+  const Geometry& g = run.series.experiment.plant.geometry;
+  int k = 0;
+  for (std::string drawing; std::getline(drawings, drawing, ';'); ++k) {
+    const auto row = std::find_if(run.series.rows.begin(), run.series.rows.end(),
+                                  [&](const Row& r) { return r.t >= from + k / rate - 1e-6; });
+    const Transform X_IP = g.fromHome(Pose::from(Vec6::Map(row->truth.x)));
+    for (const Vec3& p : g.p_PPi_P) {
+      const Vec3 at = X_IP * p;
+      EXPECT_NE(drawing.find(fmt::format("{:.4f},{:.4f}", right.dot(at), -up.dot(at))),
+                std::string::npos)
+          << k;
+    }
+  }
+  EXPECT_EQ(k, 17);
+  EXPECT_EQ(moving(run.series, {5.0, 5.0, rate}).find("<animate"), std::string::npos);
+  EXPECT_THROW(moving(run.series, {500.0, 501.0, rate}), InputError);
 }
 
 TEST(Marks, AreWhereSegmentsAndTheRobotBegin) {

@@ -3,9 +3,11 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 
 namespace ves {
 namespace {
@@ -15,73 +17,98 @@ using Json = nlohmann::ordered_json;
 double number(const Json& x) { return x.get<double>(); }
 Vec3 point(const Json& p) { return Vec3(number(p[0]), number(p[1]), number(p[2])); }
 
-/// Bodies as strokes and polygons, those behind first.
+/// Bodies as strokes and polygons, seen from above and aside.
 class Drawing {
  public:
+  /// A line of two ends, or a polygon.
+  struct Thing {
+    double depth = 0.0;               // [m] towards the eye
+    std::vector<Eigen::Vector2d> at;  // [m] to the right, down
+    bool closed = false;
+    std::string look;  // its other attributes
+
+    std::string points() const {
+      std::string out;
+      for (const Eigen::Vector2d& p : at)
+        out += fmt::format("{}{:.4f},{:.4f}", out.empty() ? "" : " ", p.x(), p.y());
+      return out;
+    }
+  };
+
   void stroke(const Vec3& a, const Vec3& b, double width, const char* colour, bool round) {
-    include(a, width);
-    include(b, width);
-    const Vec3 p = seen(a), q = seen(b);
-    things_.push_back(
-        {0.5 * (p.z() + q.z()),
-         fmt::format("<line x1=\"{:.4f}\" y1=\"{:.4f}\" x2=\"{:.4f}\" y2=\"{:.4f}\" stroke=\"{}\" "
-                     "stroke-width=\"{:.4f}\" stroke-linecap=\"{}\"/>\n",
-                     p.x(), p.y(), q.x(), q.y(), colour, width, round ? "round" : "butt")});
+    add({a, b}, width, false,
+        fmt::format("stroke=\"{}\" stroke-width=\"{:.4f}\" stroke-linecap=\"{}\"", colour, width,
+                    round ? "round" : "butt"));
   }
   void polygon(const std::vector<Vec3>& corners, const char* colour) {
-    std::string points;
-    double depth = 0.0;
-    for (const Vec3& corner : corners) {
-      include(corner, 0.0);
-      const Vec3 p = seen(corner);
-      points += fmt::format("{:.4f},{:.4f} ", p.x(), p.y());
-      depth += p.z() / static_cast<double>(corners.size());
-    }
-    things_.push_back(
-        {depth, fmt::format("<polygon points=\"{}\" fill=\"{}\"/>\n", points, colour)});
-  }
-  std::string svg() {
-    std::stable_sort(things_.begin(), things_.end(),
-                     [](const Thing& a, const Thing& b) { return a.depth < b.depth; });
-    const double margin = 0.03 * (high_ - low_).norm();
-    std::string out = fmt::format(
-        "<svg viewBox=\"{:.4f} {:.4f} {:.4f} {:.4f}\" xmlns=\"http://www.w3.org/2000/svg\">\n",
-        low_.x() - margin, low_.y() - margin, high_.x() - low_.x() + 2.0 * margin,
-        high_.y() - low_.y() + 2.0 * margin);
-    for (const Thing& thing : things_) out += thing.text;
-    return out + "</svg>\n";
+    add(corners, 0.0, true, fmt::format("fill=\"{}\"", colour));
   }
 
+  const std::vector<Thing>& things() const { return things_; }
+  const Eigen::AlignedBox2d& box() const { return box_; }
+
  private:
-  struct Thing {
-    double depth;  // [m] towards the eye
-    std::string text;
-  };
-  /// To the right, down, towards the eye.
-  static Vec3 seen(const Vec3& p) {
+  void add(const std::vector<Vec3>& points, double width, bool closed, std::string look) {
     const Vec3 eye = Vec3(0.62, -0.95, 0.5).normalized();
     const Vec3 right = Vec3::UnitZ().cross(eye).normalized(), up = eye.cross(right);
-    return {right.dot(p), -up.dot(p), eye.dot(p)};
-  }
-  void include(const Vec3& p, double width) {
-    const Eigen::Vector2d at = seen(p).head<2>(), room = Eigen::Vector2d::Constant(0.5 * width);
-    low_ = low_.cwiseMin(at - room);
-    high_ = high_.cwiseMax(at + room);
+    Thing thing;
+    thing.closed = closed;
+    thing.look = std::move(look);
+    for (const Vec3& p : points) {
+      thing.depth += eye.dot(p) / static_cast<double>(points.size());
+      thing.at.push_back({right.dot(p), -up.dot(p)});
+      const Eigen::Vector2d room = Eigen::Vector2d::Constant(0.5 * width);
+      box_.extend(thing.at.back() - room).extend(thing.at.back() + room);
+    }
+    things_.push_back(std::move(thing));
   }
 
   std::vector<Thing> things_;
-  Eigen::Vector2d low_ = Eigen::Vector2d::Constant(HUGE_VAL);
-  Eigen::Vector2d high_ = Eigen::Vector2d::Constant(-HUGE_VAL);
+  Eigen::AlignedBox2d box_;
 };
+
+/// One drawing, or several of the same things as they move, the last one `seconds` after the first;
+/// those behind first.
+std::string svg(const std::vector<Drawing>& drawings, double seconds) {
+  Eigen::AlignedBox2d box;
+  for (const Drawing& d : drawings) box.extend(d.box());
+  const Eigen::Vector2d margin = Eigen::Vector2d::Constant(0.03 * box.diagonal().norm());
+  const Eigen::Vector2d low = box.min() - margin, size = box.sizes() + 2.0 * margin;
+  std::string out = fmt::format(
+      "<svg viewBox=\"{:.4f} {:.4f} {:.4f} {:.4f}\" xmlns=\"http://www.w3.org/2000/svg\">\n",
+      low.x(), low.y(), size.x(), size.y());
+  const std::vector<Drawing::Thing>& first = drawings.front().things();
+  std::vector<std::size_t> order(first.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return first[a].depth < first[b].depth; });
+  for (const std::size_t i : order) {
+    const char* const kind = first[i].closed ? "polygon" : "polyline";
+    out += fmt::format("<{} points=\"{}\" {}{}", kind, first[i].points(),
+                       first[i].closed ? "" : "fill=\"none\" ", first[i].look);
+    std::string values;
+    bool moves = false;
+    for (const Drawing& d : drawings) {
+      const std::string points = d.things()[i].points();
+      moves = moves || points != first[i].points();
+      values += (values.empty() ? "" : ";") + points;
+    }
+    out += moves ? fmt::format(
+                       "><animate attributeName=\"points\" dur=\"{:g}s\" "
+                       "repeatCount=\"indefinite\" values=\"{}\"/></{}>\n",
+                       seconds, values, kind)
+                 : "/>\n";
+  }
+  return out + "</svg>\n";
+}
 
 constexpr const char* kMetal = "#8d99a6";
 constexpr const char* kPlate = "#6b7885";
 constexpr const char* kRobot = "#e0903a";
 constexpr const char* kArm = "#b9a878";
 
-}  // namespace
-
-std::string still(const Scene& scene, const std::vector<float>& picture, StillView view) {
+/// One instant of a scene, by its numbers (Scene::picture).
+Drawing drawn(const Scene& scene, const std::vector<float>& picture, StillView view) {
   const Json& d = scene.description();
   std::map<std::string, Transform> frames = {{"", Transform()}};
   std::size_t at = 0;
@@ -133,8 +160,10 @@ std::string still(const Scene& scene, const std::vector<float>& picture, StillVi
     for (std::size_t i = 1; i < d["arm"].size(); ++i)
       drawing.stroke(point(d["arm"][i - 1]), point(d["arm"][i]), 2.0 * number(d["arm_radius"]),
                      kArm, true);
-  return drawing.svg();
+  return drawing;
 }
+
+}  // namespace
 
 std::string stillAtStart(const Experiment& experiment, StillView view) {
   Row row;
@@ -142,7 +171,22 @@ std::string stillAtStart(const Experiment& experiment, StillView view) {
   JointVector::Map(row.sample.q) = experiment.plant.initial_joints;
   row.has_sample = true;
   const Scene scene(experiment);
-  return still(scene, scene.picture(row, {}), view);
+  return svg({drawn(scene, scene.picture(row, {}), view)}, 0.0);
+}
+
+std::string moving(const Series& series, const MovingOptions& options) {
+  const Scene scene(series.experiment);
+  std::vector<Drawing> drawings;
+  for (const Row& row : series.rows) {
+    const double next = options.from + static_cast<double>(drawings.size()) / options.rate;
+    if (row.t < next - 0.5e-9 || row.t > options.to) continue;
+    drawings.push_back(drawn(scene, scene.picture(row, {}), StillView::kPlatform));
+  }
+  if (drawings.empty())
+    throw InputError(fmt::format("nothing between {} and {} s: the log has 0 to {:.2f} s",
+                                 options.from, options.to,
+                                 series.rows.empty() ? 0.0 : series.rows.back().t));
+  return svg(drawings, static_cast<double>(drawings.size() - 1) / options.rate);
 }
 
 }  // namespace ves
