@@ -80,7 +80,7 @@ print(f"{100 * share:.1f} % of the force in x")
 assert share < 0.02
 
 # %% [markdown]
-# The report calls the split "apparently valid" (4.3). With the robots and bases of the Shuttle's arm it errs by at most
+# The split "appears to be valid", says the report (4.3). With the robots and bases of the Shuttle's arm it errs by at most
 # 0.33 % of the motion: `./ves srms simulate srms_low_hover_doss` prints it.
 #
 # ## Exercise

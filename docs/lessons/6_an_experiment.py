@@ -11,7 +11,7 @@ import numpy as np
 import matplotlib.pyplot as plt
 import ves
 
-print(open(f"{ves._config()}/scenarios/puma_on_table_4_1.yaml").read())
+print((ves.config_folder() / "scenarios/puma_on_table_4_1.yaml").read_text())
 
 # %% [markdown]
 # ## Run it
@@ -34,25 +34,19 @@ assert published.phase == "parked"
 # $$ \left[1 + \Phi^T M_1 \Phi\right] \ddot{\boldsymbol\eta} + D\,\dot{\boldsymbol\eta} + \Omega^2\boldsymbol\eta
 #    = \Phi^T \mathbf W_{\text{robot}} $$
 #
-# The base starts from rest where the platform stood when admittance control began; that is a constant to add.
+# `ves.simulate_base` lets the base begin at rest at home. The scenario begins 50 mm and 4 degrees aside, to show the
+# free swing; so move home instead, and compare what the robot causes.
 
 # %%
-def beside_truth(run, settings):
+def beside_truth(settings):
     """Times from the start of admittance control, what the platform did, what the base would have done."""
+    run = ves.run("puma_on_table_4_1", settings)
     admittance = run["segment"] == 3
     t = run["t_s"][admittance] - run["t_s"][admittance][0]
-    x = run.pose("actual")[admittance]
     t_free, free = ves.simulate_base("puma_on_table_4_1", settings)
     free = np.column_stack([np.interp(t, t_free, column) for column in free.T])
-    return t, x, free
+    return t, run.pose("actual")[admittance], free
 
-t, x, free = beside_truth(published, space)
-
-# %% [markdown]
-# Wait: the platform begins 50 mm and 4 degrees aside and swings freely, and the base in `simulate_base` begins at zero.
-# So set the program's move to home, and compare the part that the robot causes.
-
-# %%
 program = ("[{move: {}}, {calibration: {}}, {move: {}}, {admittance: {duration_s: 14}, robot: ["
            "{at_s: 5, duration_s: 1, joint: joint_2, to_deg_or_m: -30}, "
            "{at_s: 8, duration_s: 1.2, joint: joint_1, to_deg_or_m: 60}, "
@@ -62,7 +56,7 @@ figure, axes = plt.subplots(1, 2, figsize=(10, 4), sharey=True)
 error = {}
 for axis, (name, more) in zip(axes, (("as published", {}), ("compensated", compensation))):
     settings = {**space, "sensor.noise": False, "program": program, **more}
-    t, x, free = beside_truth(ves.run("puma_on_table_4_1", settings), settings)
+    t, x, free = beside_truth(settings)
     off = x - free
     error[name] = np.sqrt(np.mean(off[:, 0]**2)) / np.abs(free[:, 0]).max()
     axis.plot(t, 1e3 * free[:, 0], color="0.7", lw=4, label="base in free space")

@@ -19,6 +19,7 @@ The messages of the bus are here too, by their names in lcmtypes/: ves.state_t, 
 from __future__ import annotations  # readable in help()
 
 import os
+import pathlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -76,10 +77,6 @@ def _choice(name: str, value, allowed: Sequence[str]) -> str:
     if value not in allowed:
         raise ValueError(f"{name}: {value!r}, want one of {', '.join(allowed)}")
     return value
-
-
-def _config() -> str:
-    return os.environ.get("VES_CONFIG_DIR", _core.config)
 
 
 def _settings(settings: Mapping[str, object]) -> list:
@@ -160,7 +157,7 @@ def load_platform(name: str, settings: Mapping[str, object] = None) -> Platform:
 
     `settings`: values that differ, {"platform.home_height_m": 1.4}. Raises InputError.
     """
-    g = _core.load_platform(str(name), _config(), _settings(settings))
+    g = _core.load_platform(str(name), config_folder(), _settings(settings))
     return Platform(g.base_joints, g.platform_joints, g.home_height)
 
 
@@ -235,7 +232,7 @@ def load_robot(name: str, settings: Mapping[str, object] = None) -> Robot:
     `settings`: which joints move, {"tip": LINK}, {"joints": [..]}, {"lock.JOINT": degrees or metres}.
     Raises InputError.
     """
-    model, names, q = _core.load_robot(str(name), _config(), _settings(settings))
+    model, names, q = _core.load_robot(str(name), config_folder(), _settings(settings))
     return Robot(names, q, model)
 
 
@@ -313,7 +310,7 @@ class Base:
 
 def load_base(name: str, settings: Mapping[str, object] = None) -> Base:
     """A base of config/bases, by name or path. Raises InputError."""
-    return Base(_core.load_base(str(name), _config(), _settings(settings)))
+    return Base(_core.load_base(str(name), config_folder(), _settings(settings)))
 
 
 def modes(mass: ArrayLike, damping: ArrayLike, stiffness: ArrayLike) -> Base:
@@ -391,8 +388,13 @@ def loop_margins(scenario: str, settings: Mapping[str, object] = None) -> dict:
 
 # --- experiments --------------------------------------------------------------------------------------
 
+def config_folder() -> pathlib.Path:
+    """Where scenarios, robots, bases and platforms are: VES_CONFIG_DIR, or those that came with this."""
+    return pathlib.Path(os.environ.get("VES_CONFIG_DIR", _core.config))
+
+
 def _scenario(name: str):
-    return _core.find_scenario(str(name), _config())
+    return _core.find_scenario(str(name), config_folder())
 
 
 def simulate_base(scenario: str, settings: Mapping[str, object] = None,
