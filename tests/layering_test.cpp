@@ -31,9 +31,10 @@ const std::map<std::string, Names> kMayInclude = [] {
   add("robot", {}, "math");
   add("control", {"robot"}, "kinematics");
   add("planning", {"base"}, "robot");
-  add("plant", {"planning", "base"}, "control");
+  add("contact", {}, "robot");
+  add("plant", {"planning", "base", "contact"}, "control");
   add("simulation", {}, "plant");
-  add("srms", {"planning", "base"}, "control");
+  add("srms", {"planning", "base", "contact"}, "control");
   add("analysis", {}, "plant");
   add("config", {"srms"}, "analysis");
   add("identification", {}, "config");

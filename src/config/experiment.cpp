@@ -175,6 +175,8 @@ Experiment build(const Value& document) {
                 fmt::format("takes leg {} to {:.4f} m, want the stroke of {:.4f} to {:.4f} m",
                             i + 1, L(i), p.actuator.length_min, p.actuator.length_max));
 
+  if (root.has("environment")) p.world = readEnvironment(root.section("environment"), out);
+
   out.setup = setupOf(document);
   if (root.has("calibration")) {
     Section section = root.section("calibration");
@@ -200,6 +202,10 @@ Experiment build(const Value& document) {
   }
 
   readProgram(root, out);
+  if (p.world) {
+    const int segment = admittanceSegment(c.program);
+    p.world->release = segment < c.program.size ? segment : -1;
+  }
   root.finish();
   warnOfFullChannels(out);
   out.substitutes = countSubstitutes(document, false);
@@ -267,6 +273,8 @@ Interaction interactionOf(const Experiment& experiment, std::int64_t& duration) 
   Interaction out;
   out.base = experiment.controller.admittance;
   out.payload = experiment.plant.payload;
+  out.world = experiment.plant.world;
+  out.X_IH = experiment.plant.geometry.fromHome({});
   MovingRobot before(out.payload.robot, experiment.plant.initial_joints);
   std::int64_t now = 0;
   RobotAction in_hand = Release{};

@@ -46,6 +46,10 @@ Plant::Plant(const PlantConfig& config)
   filter_position_.settle(truth_.legs.L.array());
   filter_velocity_.settle(Vec6::Zero().array());
   filter_acceleration_.settle(Vec6::Zero().array());
+  if (config_.world) {
+    tool_ = toolMotion();
+    if (config_.world->environment.target) truth_.target = config_.world->environment.target->start;
+  }
   sensor_.settle(sensorLoad());
   if (config.sensor_readings > 1) {
     sensor_interval_ = config.sensor_window / config.sensor_readings;
@@ -104,7 +108,7 @@ double Climate::at(double t) const noexcept {
 
 /// No valve is open, no joint is on its way, and nothing is planned.
 bool Plant::still() const noexcept {
-  if (next_robot_event_ != kNever) return false;
+  if (next_robot_event_ != kNever || config_.world) return false;
   for (std::size_t i = 0; i < kLegs; ++i)
     if (slaves_[i].code() != 0 || std::abs(actuators_[i].velocity()) > kStillSpeed) return false;
   return !robot_.moving(now_);
@@ -210,6 +214,28 @@ Wrench Plant::sensorLoad() noexcept {
   return transfer(X_SL0_, Wrench{} - wrenchOnRobot(felt));
 }
 
+FrameMotion Plant::toolMotion() const noexcept {
+  return carriedFrame(robot_.model(), truth_.joints, truth_.P, config_.payload.X_PL0(),
+                      config_.world->link, config_.world->X_link);
+}
+
+/// What touches the tool while it goes from where it was to where it is, as the sensor feels it:
+/// F_So_S. The legs do not feel it, as they feel no other load.
+Wrench Plant::meetWorld(double dt) noexcept {
+  const World& world = *config_.world;
+  const FrameMotion now = toolMotion();
+  const bool held = world.release >= 0 && began_[static_cast<std::size_t>(world.release)] == kNever;
+  Floating target = truth_.target;
+  if (held) target.v = target.w = Vec3::Zero();
+  const Touch mean = ves::advance(world.environment, tool_, now, dt, kContactStep, target);
+  if (!held) truth_.target = target;
+  tool_ = now;
+  truth_.contact_To_I = mean.on_tool_To_I;
+  truth_.clearance = mean.least;
+  const Transform X_IS = truth_.P.X * config_.payload.X_PS;
+  return rotate(X_IS.R.transpose(), shift(mean.on_tool_To_I, X_IS.p - now.X.p));
+}
+
 /// F_L0o_L0. A robot that stands is one body.
 Wrench Plant::wrenchOnRobot(const ProperMotion& L0) noexcept {
   const JointState& joints = truth_.joints;
@@ -260,7 +286,8 @@ void Plant::stepMechanics() noexcept {
       forward.ok() && forwardMotion(config_.geometry, forward.X_IP, legs, truth_.P, jacobian_);
   truth_.joints = real_joints_ ? *real_joints_ : robot_.at(now_);
 
-  const Wrench F_So_S = sensorLoad();
+  Wrench F_So_S = sensorLoad();
+  if (config_.world) F_So_S = F_So_S + meetWorld(dt);
   // Behind Filter 3 the acceleration is smooth again, and known at the end of the step.
   const auto over = config_.filters == LegFilters::kNone ? ForceTorqueSensor::Over::kConstant
                                                          : ForceTorqueSensor::Over::kRamp;

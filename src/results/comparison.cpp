@@ -98,12 +98,14 @@ std::optional<BaseMotion> baseMotion(const Experiment& e, const Vec6& start,
       e.controller.admittance.stiffness.size() > kMostModes)
     return {};
   std::int64_t duration = 0;
-  const Interaction interaction = interactionOf(e, duration);
+  Interaction interaction = interactionOf(e, duration);
   const Eigen::VectorXd eta = leastSquares(interaction.base.Phi, start);
+  const Vec6 rest = start - interaction.base.Phi * eta;
+  if (interaction.world) interaction.X_IH.p += rest.head<3>();
   const std::optional<Motion>& base =
       references.of(interaction, e.controller.period, duration, eta);
   if (!base) return {};
-  return BaseMotion{*base, start - interaction.base.Phi * eta};
+  return BaseMotion{*base, rest};
 }
 
 std::optional<Emulation> emulation(const Series& series, ReferenceMotions& references) {

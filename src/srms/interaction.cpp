@@ -21,25 +21,35 @@ struct FreeDriver {
   void operator()(gsl_odeiv2_driver* d) const { gsl_odeiv2_driver_free(d); }
 };
 
-/// The equations of motion, y = {eta, eta', quaternion of R_IP}.
+/// The equations of motion, y = {eta, eta', quaternion of R_IP}, and where there is a world
+/// {p, q, v, w} of what floats in it.
 class Equations {
  public:
   Equations(const Interaction& interaction, const InteractionOptions& options)
-      : base_(interaction.base),
+      : interaction_(interaction),
+        base_(interaction.base),
         robot_(carried(interaction.payload), interaction.q0),
         X_PL0_(interaction.payload.X_PL0()),
         options_(options) {}
 
   Eigen::Index modes() const { return base_.stiffness.size(); }
-  std::size_t size() const { return static_cast<std::size_t>(2 * modes() + 4); }
+  Eigen::Index attitude() const { return 2 * modes(); }  // of the quaternion, its index
+  std::size_t size() const {
+    return static_cast<std::size_t>(attitude() + 4 + (interaction_.world ? kFloating : 0));
+  }
 
   VectorXd start() const {
     const Eigen::Index k = modes();
-    VectorXd y = VectorXd::Zero(2 * k + 4);
+    VectorXd y = VectorXd::Zero(static_cast<Eigen::Index>(size()));
     if (options_.eta.size()) y.head(k) = options_.eta;
     if (options_.eta_dot.size()) y.segment(k, k) = options_.eta_dot;
     const Vec3 turned = base_.Phi.bottomRows<3>() * y.head(k);
-    y.tail<4>() = Eigen::Quaterniond(rotation(turned)).coeffs();
+    y.segment<4>(attitude()) = Eigen::Quaterniond(rotation(turned)).coeffs();
+    if (interaction_.world) {
+      const std::optional<Target>& target = interaction_.world->environment.target;
+      const Floating f = target ? target->start : Floating{};
+      y.tail<kFloating>() << f.p, f.q.coeffs(), f.v, f.w;
+    }
     return y;
   }
 
@@ -64,28 +74,73 @@ class Equations {
       split(q, eta_dot, A, right);
     else
       whole(q, y, A, right);
+    if (interaction_.world) {
+      const BodyMotion P = platform(y);
+      const FrameMotion tool = toolMotion(q, P);
+      const Touch touched = touch(interaction_.world->environment, tool, floating(y));
+      right += base_.Phi.transpose() * shift(touched.on_tool_To_I, P.X.p - tool.X.p).stacked();
+      const FloatingRates f =
+          rates(interaction_.world->environment, floating(y), touched.on_target_Bo_I);
+      dy.tail<kFloating>() << f.p, f.q, f.v, f.w;
+    }
     dy.segment(k, k) = solvePositive(A, right);
     const Vec3 w = base_.Phi.bottomRows<3>() * eta_dot;
-    const Eigen::Quaterniond R_IP(Eigen::Vector4d(y.tail<4>()));
-    dy.tail<4>() = 0.5 * (Eigen::Quaterniond(0.0, w.x(), w.y(), w.z()) * R_IP).coeffs();
+    const Eigen::Quaterniond R_IP(Eigen::Vector4d(y.segment<4>(attitude())));
+    dy.segment<4>(attitude()) =
+        0.5 * (Eigen::Quaterniond(0.0, w.x(), w.y(), w.z()) * R_IP).coeffs();
   }
 
-  InteractionPoint point(double t, const VectorXd& y) const {
+  InteractionPoint point(std::int64_t now, const VectorXd& y) const {
     const Eigen::Index k = modes();
     InteractionPoint p;
-    p.t = t;
+    p.t = static_cast<double>(now) * kSecondPerNanosecond;
     p.eta = y.head(k);
     p.eta_dot = y.segment(k, k);
     p.x = base_.Phi * p.eta;
     p.x_dot = base_.Phi * p.eta_dot;
     if (options_.model == InteractionModel::kWhole) {
-      p.R_IP = Eigen::Quaterniond(Eigen::Vector4d(y.tail<4>())).normalized().toRotationMatrix();
+      p.R_IP = platform(y).X.R;
       p.x.tail<3>() = fixedAngles(p.R_IP);
+    }
+    if (interaction_.world) {
+      p.target = floating(y);
+      p.touch =
+          touch(interaction_.world->environment, toolMotion(robot_.at(now), platform(y)), p.target);
     }
     return p;
   }
 
+  void normalise(VectorXd& y) const { y.segment<4>(attitude()).normalize(); }
+
  private:
+  static constexpr int kFloating = 13;
+
+  Floating floating(const VectorXd& y) const {
+    const Eigen::Matrix<double, kFloating, 1> f = y.tail<kFloating>();
+    Floating out;
+    out.p = f.head<3>();
+    out.q = Eigen::Quaterniond(Eigen::Vector4d(f.segment<4>(3))).normalized();
+    out.v = f.segment<3>(7);
+    out.w = f.tail<3>();
+    return out;
+  }
+  /// Where P is, and how it moves.
+  BodyMotion platform(const VectorXd& y) const {
+    const Eigen::Index k = modes();
+    BodyMotion P;
+    P.X.R = Eigen::Quaterniond(Eigen::Vector4d(y.segment<4>(attitude())))
+                .normalized()
+                .toRotationMatrix();
+    P.X.p = interaction_.X_IH.p + base_.Phi.topRows<3>() * y.head(k);
+    P.v = base_.Phi.topRows<3>() * y.segment(k, k);
+    P.w = base_.Phi.bottomRows<3>() * y.segment(k, k);
+    return P;
+  }
+  FrameMotion toolMotion(const JointState& q, const BodyMotion& P) const {
+    return carriedFrame(robot_.model(), q, P, X_PL0_, interaction_.world->link,
+                        interaction_.world->X_link);
+  }
+
   /// What the base feels of the robot, about Po in P.
   Wrench reaction(const JointState& q, const ProperMotion& L0) const {
     return transfer(X_PL0_, Wrench{} - newtonEuler(robot_.model(), q, L0).F_L0o_L0);
@@ -111,7 +166,7 @@ class Equations {
   void whole(const JointState& q, const VectorXd& y, MatrixXd& A, VectorXd& right) const {
     const Eigen::Index k = modes();
     BodyMotion P;
-    P.X.R = Eigen::Quaterniond(Eigen::Vector4d(y.tail<4>())).normalized().toRotationMatrix();
+    P.X.R = platform(y).X.R;
     P.w = base_.Phi.bottomRows<3>() * y.segment(k, k);
     // The wrench is affine in the base's acceleration: this much without, the locked mass with it.
     const Wrench F_Po_P = reaction(q, properMotion(P, X_PL0_, Vec3::Zero()));
@@ -121,6 +176,7 @@ class Equations {
     A = MatrixXd::Identity(k, k) + base_.Phi.transpose() * M_1 * base_.Phi;
   }
 
+  const Interaction& interaction_;
   const ModalModel& base_;
   MovingRobot robot_;
   Transform X_PL0_;
@@ -167,7 +223,7 @@ std::vector<InteractionPoint> simulate(const Interaction& interaction,
   auto next = interaction.actions.begin();
   std::int64_t now = 0;
   for (std::int64_t step = 0; now <= options.duration; ++step) {
-    out.push_back(equations.point(static_cast<double>(now) * kSecondPerNanosecond, y));
+    out.push_back(equations.point(now, y));
     const std::int64_t end = (step + 1) * options.step;
     while (now < end) {
       equations.begin(now, step);
@@ -185,7 +241,7 @@ std::vector<InteractionPoint> simulate(const Interaction& interaction,
             "too small a tolerance is asked");
       now = until;
     }
-    y.tail<4>().normalize();
+    equations.normalise(y);
   }
   return out;
 }

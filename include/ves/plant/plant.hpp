@@ -17,6 +17,7 @@
 #include <optional>
 #include <vector>
 
+#include "ves/contact/environment.hpp"
 #include "ves/control/program.hpp"
 #include "ves/control/sample.hpp"
 #include "ves/planning/moving_robot.hpp"
@@ -39,6 +40,9 @@ struct RobotEvent {
   Cue cue;
   RobotAction action;
 };
+
+/// Between two looks at what touches; half of it changes no figure of a contact by 1 %.
+inline constexpr double kContactStep = 50e-6;  // [s]
 
 /// What the LegSlaves do when nobody commands them: they keep their last reference, and after a
 /// while go slowly home, unless the last command told them to stay or a safety loop has been opened
@@ -74,6 +78,7 @@ struct PlantConfig {
   JointVector initial_joints = JointVector::Zero();
   std::vector<RobotEvent> robot_events;
   std::vector<FaultEvent> faults;
+  std::optional<World> world;
   Watchdog watchdog;
   std::uint32_t seed = 1;
 };
@@ -86,6 +91,9 @@ struct Truth {
   Wrench F_Po_I;          // on the platform from all the sensor carries
   Wrench F_So_S;          // what the sensor reads, before it is rounded to counts
   JointState joints;
+  Wrench contact_To_I;          // on the tool from what it touches, mean over the last step
+  double clearance = HUGE_VAL;  // [m] of the tool from the nearest surface, least in it
+  Floating target;              // the body that floats
   LegMotion legs;               // of the actuators, unfiltered
   Vec6 current = Vec6::Zero();  // [A] valves
   bool legs_agree = true;       // forward kinematics found a pose
@@ -142,6 +150,8 @@ class Plant {
   void planRobotEvent() noexcept;
   void startRobotEvents() noexcept;
   Wrench sensorLoad() noexcept;
+  FrameMotion toolMotion() const noexcept;
+  Wrench meetWorld(double dt) noexcept;
   Wrench wrenchOnRobot(const ProperMotion& L0) noexcept;
   LegMotion legOutputs(double dt) noexcept;
 
@@ -183,6 +193,7 @@ class Plant {
   };
   std::optional<Standing> standing_;  // the robot while its joints stand
   JacobianFactors jacobian_;          // at the last step
+  FrameMotion tool_;                  // at the last step, where there is a world
   std::optional<LegMotion> real_legs_;
   std::optional<JointState> real_joints_;
   Truth truth_;

@@ -12,8 +12,10 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
+#include "ves/contact/environment.hpp"
 #include "ves/control/admittance_model.hpp"
 #include "ves/planning/moving_robot.hpp"
 #include "ves/robot/payload.hpp"
@@ -33,6 +35,8 @@ struct Interaction {
   Payload payload;                       // what stands on it
   JointVector q0 = JointVector::Zero();  // [rad | m]
   std::vector<TimedAction> actions;      // of the robot, by time
+  std::optional<World> world;            // what its tool touches
+  Transform X_IH;                        // where P is in I when the base is at x = 0
 
   bool operator==(const Interaction&) const = default;
 };
@@ -57,6 +61,8 @@ struct InteractionPoint {
   Vec6 x_dot = Vec6::Zero();  // [m/s, rad/s] Phi eta'
   Eigen::VectorXd eta, eta_dot;
   Mat3 R_IP = Mat3::Identity();  // whole model only
+  Touch touch;                   // where there is a world
+  Floating target;
 };
 
 /// GSL's Runge-Kutta Prince-Dormand (8, 9) with adaptive steps. Throws std::domain_error when the

@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/contact/environment.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ves {
+namespace {
+
+/// One feeler on one body: adds what it does to the tool; returns the force, and where it acts.
+struct Push {
+  Vec3 force_I = Vec3::Zero();  // [N] on the tool
+  Vec3 p_I = Vec3::Zero();      // [m] where
+};
+Push push(const ContactLaw& law, const Feeler& feeler, const FrameMotion& tool, const Shape& shape,
+          const Transform& X_IB, const Vec3& v_IB_I, const Vec3& w_IB_I, Touch& out) {
+  const Vec3 centre = tool.X * feeler.p_TQ_T;
+  const Proximity near = proximity(shape, inverse(X_IB) * centre);
+  const double gap = near.distance - feeler.radius;
+  out.least = std::min(out.least, gap);
+  Push done;
+  if (!(gap < 0.0)) return done;
+  const Vec3 n = X_IB.R * near.normal;
+  done.p_I = centre - feeler.radius * n;
+  const Vec3 v =
+      tool.v + tool.w.cross(done.p_I - tool.X.p) - (v_IB_I + w_IB_I.cross(done.p_I - X_IB.p));
+  done.force_I = contactForce(law, -gap, n, v);
+  out.stored += storedEnergy(law, -gap);
+  out.on_tool_To_I.f += done.force_I;
+  out.on_tool_To_I.n += (done.p_I - tool.X.p).cross(done.force_I);
+  return done;
+}
+
+Floating moved(const Floating& from, const FloatingRates& by, double dt) {
+  Floating out;
+  out.p = from.p + dt * by.p;
+  out.v = from.v + dt * by.v;
+  out.w = from.w + dt * by.w;
+  out.q.coeffs() = from.q.coeffs() + dt * by.q;
+  out.q.normalize();
+  return out;
+}
+
+/// Between two motions, a share s of dt after the first: a cubic for the place, the turn even.
+FrameMotion between(const FrameMotion& a, const FrameMotion& b, double dt, double s) {
+  const double s2 = s * s, s3 = s2 * s;
+  FrameMotion out;
+  out.X.p = (2.0 * s3 - 3.0 * s2 + 1.0) * a.X.p + (s3 - 2.0 * s2 + s) * dt * a.v +
+            (3.0 * s2 - 2.0 * s3) * b.X.p + (s3 - s2) * dt * b.v;
+  out.v = (6.0 * s2 - 6.0 * s) / dt * (a.X.p - b.X.p) + (3.0 * s2 - 4.0 * s + 1.0) * a.v +
+          (3.0 * s2 - 2.0 * s) * b.v;
+  const Eigen::Quaterniond from(a.X.R), to(b.X.R);
+  out.X.R = from.slerp(s, to).toRotationMatrix();
+  out.w = a.w + s * (b.w - a.w);
+  return out;
+}
+
+}  // namespace
+
+Touch touch(const Environment& environment, const FrameMotion& tool,
+            const Floating& target) noexcept {
+  Touch out;
+  for (const Feeler& feeler : environment.tool) {
+    for (const FixedBody& body : environment.bodies)
+      push(environment.law, feeler, tool, body.shape, body.X_IB, Vec3::Zero(), Vec3::Zero(), out);
+    if (!environment.target) continue;
+    const Push on = push(environment.law, feeler, tool, environment.target->shape, target.X_IB(),
+                         target.v, target.w, out);
+    out.on_target_Bo_I.f -= on.force_I;
+    out.on_target_Bo_I.n -= (on.p_I - target.p).cross(on.force_I);
+  }
+  return out;
+}
+
+FloatingRates rates(const Environment& environment, const Floating& target,
+                    const Wrench& on_target_Bo_I) noexcept {
+  FloatingRates out;
+  out.p = target.v;
+  out.q =
+      0.5 * (Eigen::Quaterniond(0.0, target.w.x(), target.w.y(), target.w.z()) * target.q).coeffs();
+  out.v = out.w = Vec3::Zero();
+  if (!environment.target) return out;
+  const Target& body = *environment.target;
+  out.v = on_target_Bo_I.f / body.mass + environment.gravity;
+  const Mat3 R = target.q.toRotationMatrix(), I_I = R * body.I_Bcm_B * R.transpose();
+  out.w = I_I.ldlt().solve(on_target_Bo_I.n - target.w.cross(I_I * target.w));
+  return out;
+}
+
+Touch advance(const Environment& environment, const FrameMotion& from, const FrameMotion& to,
+              double dt, double step, Floating& target) noexcept {
+  Touch mean;
+  if (!(dt > 0.0)) return mean;
+  const int steps = std::max(1, static_cast<int>(std::ceil(dt / step - 1e-9)));
+  const double h = dt / steps;
+  for (int k = 0; k < steps; ++k) {
+    const auto tool = [&](double later) { return between(from, to, dt, (k + later) / steps); };
+    const FrameMotion begin = tool(0.0), middle = tool(0.5), end = tool(1.0);
+    const auto at = [&](const FrameMotion& t, const Floating& body, Touch& touched) {
+      touched = touch(environment, t, body);
+      return rates(environment, body, touched.on_target_Bo_I);
+    };
+    std::array<Touch, 4> t;
+    const FloatingRates a = at(begin, target, t[0]);
+    const FloatingRates b = at(middle, moved(target, a, 0.5 * h), t[1]);
+    const FloatingRates c = at(middle, moved(target, b, 0.5 * h), t[2]);
+    const FloatingRates d = at(end, moved(target, c, h), t[3]);
+    const FloatingRates sum = {a.p + 2.0 * b.p + 2.0 * c.p + d.p, a.v + 2.0 * b.v + 2.0 * c.v + d.v,
+                               a.w + 2.0 * b.w + 2.0 * c.w + d.w,
+                               a.q + 2.0 * b.q + 2.0 * c.q + d.q};
+    target = moved(target, sum, h / 6.0);
+    constexpr std::array<double, 4> kWeights = {1.0, 2.0, 2.0, 1.0};
+    for (std::size_t i = 0; i < 4; ++i) {
+      const double share = kWeights[i] / (6.0 * steps);
+      const auto add = [&](Wrench& sum_of, const Wrench& one) {
+        sum_of.f += share * one.f;
+        sum_of.n += share * one.n;
+      };
+      add(mean.on_tool_To_I, t[i].on_tool_To_I);
+      add(mean.on_target_Bo_I, t[i].on_target_Bo_I);
+      mean.least = std::min(mean.least, t[i].least);
+      mean.stored += share * t[i].stored;
+    }
+  }
+  return mean;
+}
+
+FrameMotion carriedFrame(const RobotModel& robot, const JointState& joints, const BodyMotion& base,
+                         const Transform& X_BaseL0, int link, const Transform& X_link) noexcept {
+  const LinkPoses X_L0L = linkPoses(robot, joints.q);
+  const Transform X_IL0 = base.X * X_BaseL0;
+  FrameMotion out;
+  out.X = X_IL0 * (link < 0 ? X_link : X_L0L[link] * X_link);
+  out.w = base.w;
+  out.v = base.v + base.w.cross(out.X.p - base.X.p);
+  // Every joint between the base and the frame adds its own motion.
+  for (int i = link; i >= 0; i = robot.link(i).parent) {
+    const Link& l = robot.link(i);
+    const Transform X_IL = X_IL0 * X_L0L[i];
+    const Vec3 axis = X_IL.R * l.axis * (l.ratio * joints.q_dot(l.joint));
+    if (l.type == JointType::kRevolute) {
+      out.w += axis;
+      out.v += axis.cross(out.X.p - X_IL.p);
+    } else {
+      out.v += axis;
+    }
+  }
+  return out;
+}
+
+}  // namespace ves

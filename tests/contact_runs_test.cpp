@@ -1,0 +1,319 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Contact in the plant and in free space: a target meets the tool, and the books are kept.
+#include <gtest/gtest.h>
+
+#include "support/refusal.hpp"
+#include "support/rig.hpp"
+#include "ves/config/experiment.hpp"
+#include "ves/plant/plant.hpp"
+#include "ves/srms/interaction.hpp"
+
+namespace ves {
+namespace {
+
+constexpr double kMass = 100.0, kSpeed = 0.02;  // [kg], [m/s] of the target
+
+/// The PUMA in space, a ball of 0.3 m drifting along -x against its tool, 5 mm before it touches.
+Experiment meeting(double stiffness, const std::string& contact = "",
+                   const std::vector<std::string>& more = {}) {
+  std::vector<std::string> set = {
+      "gravity_m_per_s2=0", "sensor.noise=false", "initial_pose={}",
+      fmt::format("environment={{tool: [{{radius_m: 0.02}}], contact: {{stiffness: {}{}}}, target: "
+                  "{{mass_kg: {}, from_tool_m: [0.325, 0, 0], velocity_m_per_s: [{}, 0, 0], ball: "
+                  "{{radius_m: 0.3}}}}}}",
+                  stiffness, contact, kMass, -kSpeed)};
+  set.insert(set.end(), more.begin(), more.end());
+  return test::experiment("puma_on_table_4_1", set);
+}
+
+/// The plant by itself, without a program that would let the target go.
+plant::Plant alone(Experiment e) {
+  e.plant.world->release = -1;
+  return plant::Plant(e.plant);
+}
+
+// Legs that nobody commands hold the platform, whatever pushes: the target meets a wall.
+TEST(ContactInThePlant, ATargetReboundsFromAToolThatIsHeld) {
+  for (const double k : {1e3, 1e5}) {
+    const Experiment e = meeting(k);
+    plant::Plant plant = alone(e);
+    const Vec3 held = plant.truth().P.X.p;
+    const double omega = std::sqrt(k / kMass);
+    double peak = 0.0, impulse = 0.0, touched = 0.0, felt = 0.0;
+    constexpr double dt = 1e-3;
+    for (int i = 1; i <= 2000; ++i) {
+      plant.advance(static_cast<std::int64_t>(i) * 1'000'000);
+      plant.sample();
+      const plant::Truth& t = plant.truth();
+      // The last step of the mechanics ended now.
+      peak = std::max(peak, t.contact_To_I.f.norm());
+      felt = std::max(felt, t.F_Po_I.f.norm());
+      impulse += dt * t.contact_To_I.f.norm();
+      if (t.contact_To_I.f.norm() > 0.0) touched += dt;
+      EXPECT_LT((t.P.X.p - held).norm(), 2e-4);  // a count of a leg
+    }
+    const plant::Truth& t = plant.truth();
+    EXPECT_NEAR(t.target.v.x(), kSpeed, 0.01 * kSpeed) << k;
+    EXPECT_NEAR(peak, kSpeed * std::sqrt(k * kMass), 0.01 * peak) << k;
+    EXPECT_NEAR(touched, M_PI / omega, 0.01 * M_PI / omega + 2.0 * dt) << k;
+    EXPECT_NEAR(impulse, 2.0 * kMass * kSpeed, 0.02 * impulse) << k;
+    EXPECT_NEAR(felt, peak, 0.05 * peak)
+        << k;  // by the sensor's platform, and the robot's own shake
+    EXPECT_GT(t.clearance, 0.0);
+  }
+}
+
+// The wrench on the sensor is the contact's, moved from the tool to the sensor.
+TEST(ContactInThePlant, TheSensorFeelsTheToolsWrenchAtItsPlace) {
+  const Experiment e = meeting(1e3, ", friction: 0.4");
+  plant::Plant plant = alone(e);
+  const Payload& payload = e.plant.payload;
+  int touched = 0;
+  for (int i = 1; i <= 800; ++i) {
+    plant.advance(static_cast<std::int64_t>(i) * 1'000'000);
+    plant.sample();
+    const plant::Truth& t = plant.truth();
+    if (!(t.contact_To_I.f.norm() > 1.0)) continue;
+    ++touched;
+    // In space a robot at rest feels nothing else, but for what the legs' counts shake.
+    const Transform X_IT =
+        t.P.X * payload.X_PL0() * e.robot.tool()->pose(linkPoses(payload.robot, t.joints.q));
+    const Vec3 moment = t.contact_To_I.n + (X_IT.p - t.P.X.p).cross(t.contact_To_I.f);
+    EXPECT_LT((t.F_Po_I.f - t.contact_To_I.f).norm(), 0.05 * t.contact_To_I.f.norm() + 0.05);
+    EXPECT_LT((t.F_Po_I.n - moment).norm(), 0.05 * moment.norm() + 0.05);
+  }
+  EXPECT_GT(touched, 100);
+}
+
+TEST(ContactInThePlant, IsTheSameHoweverItIsAskedFor) {
+  const Experiment e = meeting(1e4, ", exponent: 1.5, damping_s_per_m: 10");
+  plant::Plant often = alone(e), seldom = alone(e);
+  for (int i = 1; i <= 1500; ++i) often.advance(static_cast<std::int64_t>(i) * 10'000'000);
+  seldom.advance(15'000'000'000);  // nothing else moves, but time must not be passed over
+  EXPECT_GT(seldom.truth().target.v.x(), 0.0);
+  EXPECT_EQ(often.truth().target.v, seldom.truth().target.v);
+  EXPECT_EQ(often.truth().target.p, seldom.truth().target.p);
+}
+
+// A wall under a tool that the robot lowers: the force is the spring's at the tool's own pose.
+TEST(ContactInThePlant, APressedBoardPushesAsDeepAsTheToolIsIn) {
+  const Experiment e = test::experiment(
+      "puma_on_table_4_1",
+      {"gravity_m_per_s2=0", "sensor.noise=false", "initial_pose={}",
+       "environment={tool: [{radius_m: 0.02}], contact: {stiffness: 2000}, bodies: [{from_tool_m: "
+       "[-0.03, 0, 0], rpy_deg: [0, 90, 0], half_space: {}}]}"});
+  plant::Plant plant = alone(e);
+  RobotMove move;
+  move.joint = 1;
+  move.target = e.plant.initial_joints(1) - 0.2;
+  move.duration = 1.0;
+  ASSERT_TRUE(plant.moveRobot(move));
+  const Payload& payload = e.plant.payload;
+  const FixedBody& board = e.plant.world->environment.bodies[0];
+  const Vec3 out = board.X_IB.R.col(2);
+  int touched = 0;
+  for (int i = 1; i <= 1500; ++i) {
+    plant.advance(static_cast<std::int64_t>(i) * 1'000'000);
+    plant.sample();
+    const plant::Truth& t = plant.truth();
+    const Transform X_IT =
+        t.P.X * payload.X_PL0() * e.robot.tool()->pose(linkPoses(payload.robot, t.joints.q));
+    const double depth = 0.02 - out.dot(X_IT.p - board.X_IB.p);
+    if (depth < 1e-3) continue;
+    ++touched;
+    const double speed = 0.2 / 1.0 * 2.0;  // [m/s] at most; the mean is half a millisecond old
+    EXPECT_NEAR(t.contact_To_I.f.dot(out), 2000.0 * depth, 2000.0 * speed * 1e-3) << i;
+    EXPECT_NEAR(t.contact_To_I.f.norm(), t.contact_To_I.f.dot(out), 1e-9);
+  }
+  EXPECT_GT(touched, 300);
+}
+
+// The target waits for admittance control, as it begins with it in free space.
+TEST(ContactInThePlant, WhatFloatsIsLetGoWhenAdmittanceControlBegins) {
+  const double speed = 0.05;  // and far enough that the move before does not reach it
+  Experiment e = meeting(300.0, "",
+                         {"environment.target.from_tool_m=[0.6, 0, 0]",
+                          fmt::format("environment.target.velocity_m_per_s=[{}, 0, 0]", -speed)});
+  ASSERT_EQ(e.plant.world->release, 3);
+  ASSERT_EQ(applyStabilityCheck(e), "");
+  Lockstep machine(e.controller, e.plant);
+  machine.step({Request::kStart, {}, {}});
+  const Vec3 start = e.plant.world->environment.target->start.p;
+  double began = -1.0;
+  int drifted = 0;
+  bool met = false;
+  while (machine.state().phase != Phase::kParked && machine.state().phase != Phase::kStopped) {
+    const TickState& s = machine.step();
+    const plant::Truth& t = machine.plant().truth();
+    const double now = static_cast<double>(t.time) * 1e-9;
+    if (s.segment == 3 && began < 0.0) began = now;
+    met = met || t.contact_To_I.f.norm() > 0.0;
+    if (began < 0.0) {
+      EXPECT_EQ(t.target.p, start) << now;
+    }
+    if (began < 0.0 || met) continue;
+    EXPECT_NEAR(t.target.p.x(), start.x() - speed * (now - began), 0.021 * speed);
+    ++drifted;
+  }
+  EXPECT_EQ(machine.state().phase, Phase::kParked);
+  EXPECT_GT(drifted, 5);
+  EXPECT_TRUE(met);
+}
+
+/// The same in free space: a base without springs or damping, of so much mass and inertia.
+Interaction afloat(const Experiment& e, double mass, double inertia) {
+  std::int64_t duration = 0;
+  Interaction i = interactionOf(e, duration);
+  Vec6 share;
+  share << Vec3::Constant(1.0 / std::sqrt(mass)), Vec3::Constant(1.0 / std::sqrt(inertia));
+  i.base.Phi = share.asDiagonal();
+  i.base.stiffness = Vec6::Zero();
+  i.base.damping = Mat6::Zero();
+  i.actions.clear();
+  return i;
+}
+
+// A base that cannot turn and the target are two masses on a spring: closed form.
+TEST(ContactInFreeSpace, TwoMassesPartAsTheyMet) {
+  const double k = 1e4, base = 400.0;
+  const Interaction i = afloat(meeting(k), base, 1e12);
+  const double carried = compositeBody(ves::carried(i.payload), i.q0).mass, M = base + carried,
+               mu = M * kMass / (M + kMass);
+  InteractionOptions options;
+  options.model = InteractionModel::kWhole;
+  options.duration = 2'000'000'000;
+  options.step = 1'000'000;
+  double touched = 0.0, peak = 0.0;
+  const std::vector<InteractionPoint> points = simulate(i, options);
+  for (const InteractionPoint& p : points) {
+    if (p.touch.least < 0.0) touched += 1e-3;
+    peak = std::max(peak, p.touch.on_tool_To_I.f.norm());
+  }
+  EXPECT_NEAR(points.back().target.v.x(), -kSpeed * (kMass - M) / (kMass + M), 1e-7);
+  EXPECT_NEAR(points.back().x_dot.x(), -kSpeed * 2.0 * kMass / (kMass + M), 1e-7);
+  EXPECT_NEAR(touched, M_PI * std::sqrt(mu / k), 2e-3);
+  EXPECT_NEAR(peak, kSpeed * std::sqrt(k * mu), 1e-4 * peak);
+}
+
+// Nothing is anchored: momentum, moment of momentum and energy of base, robot and target.
+TEST(ContactInFreeSpace, NothingIsLostWithoutAnAnchor) {
+  Experiment e = meeting(2e3);
+  e.plant.world->environment.target->start.p += Vec3(0.0, 0.08, 0.05);  // off centre
+  const double base = 400.0, inertia = 60.0;
+  const Interaction i = afloat(e, base, inertia);
+  const RigidBody robot_P =
+      combine(RigidBody{}, i.payload.X_PL0(), compositeBody(ves::carried(i.payload), i.q0));
+  InteractionOptions options;
+  options.model = InteractionModel::kWhole;
+  options.duration = 3'000'000'000;
+  options.step = 5'000'000;
+  options.tolerance = 1e-12;
+  const Target& target = *i.world->environment.target;
+  struct Books {
+    Vec3 p, L;
+    double energy;
+  };
+  const auto books = [&](const InteractionPoint& at) {
+    const Vec3 v = at.x_dot.head<3>(), w = at.x_dot.tail<3>(), r = i.X_IH.p + at.x.head<3>();
+    const Vec3 c = at.R_IP * robot_P.p_BoBcm_B, v_c = v + w.cross(c);
+    const Mat3 I_r = at.R_IP * robot_P.I_Bcm_B * at.R_IP.transpose();
+    const Mat3 R = at.target.q.toRotationMatrix(), I_t = R * target.I_Bcm_B * R.transpose();
+    const double m = robot_P.mass, M = target.mass;
+    Books b;
+    b.p = base * v + m * v_c + M * at.target.v;
+    b.L = inertia * w + r.cross(base * v) + I_r * w + (r + c).cross(m * v_c) + I_t * at.target.w +
+          at.target.p.cross(M * at.target.v);
+    b.energy = 0.5 * (base * v.dot(v) + inertia * w.dot(w) + m * v_c.dot(v_c) + w.dot(I_r * w) +
+                      M * at.target.v.dot(at.target.v) + at.target.w.dot(I_t * at.target.w)) +
+               at.touch.stored;
+    return b;
+  };
+  const std::vector<InteractionPoint> points = simulate(i, options);
+  const Books start = books(points.front());
+  double most = 0.0;
+  for (const InteractionPoint& at : points) {
+    const Books now = books(at);
+    EXPECT_LT((now.p - start.p).norm(), 1e-9) << at.t;
+    EXPECT_LT((now.L - start.L).norm(), 1e-9) << at.t;
+    EXPECT_NEAR(now.energy, start.energy, 1e-9) << at.t;
+    most = std::max(most, at.touch.stored);
+  }
+  EXPECT_GT(most, 1e-3);                                  // it did touch,
+  EXPECT_GT(points.back().x_dot.tail<3>().norm(), 1e-4);  // and turned the base
+}
+
+// Damping sees how fast the tool really comes, on a base that turns: the rate of the depth itself.
+TEST(ContactInFreeSpace, DampingGoesByTheRateOfTheDepth) {
+  Experiment e = meeting(2e3, ", damping_s_per_m: 30");
+  const Interaction i = afloat(e, 200.0, 20.0);
+  InteractionOptions options;
+  options.model = InteractionModel::kWhole;
+  options.duration = 1'500'000'000;
+  options.step = 1'000'000;
+  const std::vector<InteractionPoint> points = simulate(i, options);
+  int touched = 0;
+  double turned = 0.0;
+  for (std::size_t n = 1; n + 1 < points.size(); ++n) {
+    const double before = -points[n - 1].touch.least, d = -points[n].touch.least,
+                 after = -points[n + 1].touch.least;
+    if (!(before > 0.0 && after > 0.0)) continue;
+    ++touched;
+    turned = std::max(turned, points[n].x_dot.tail<3>().norm());
+    const double rate = (after - before) / 2e-3;
+    EXPECT_NEAR(points[n].touch.on_tool_To_I.f.norm(), 2e3 * d * (1.0 + 30.0 * rate),
+                1e-4 + 1e-3 * 2e3 * d);
+  }
+  EXPECT_GT(touched, 100);
+  EXPECT_GT(turned, 5e-3);
+}
+
+TEST(ContactInFreeSpace, AWorldThatNobodyTouchesChangesNothing) {
+  std::int64_t duration = 0;
+  const Experiment with = meeting(1e4, "",
+                                  {"environment.target.from_tool_m=[5, 0, 0]",
+                                   "base.damping_diagonal=[50, 50, 50, 25, 25, 25]"});
+  Interaction i = interactionOf(with, duration);
+  InteractionOptions options;
+  options.model = InteractionModel::kWhole;
+  options.duration = duration;
+  const std::vector<InteractionPoint> a = simulate(i, options);
+  i.world.reset();
+  const std::vector<InteractionPoint> b = simulate(i, options);
+  double moved = 0.0;
+  for (std::size_t n = 0; n < a.size(); ++n) {
+    EXPECT_LT((a[n].x - b[n].x).norm(), 1e-9);
+    moved = std::max(moved, b[n].x.norm());
+  }
+  EXPECT_GT(moved, 1e-3);
+}
+
+TEST(ContactConfig, IsRefusedByName) {
+  const auto said = [&](const std::string& set) {
+    return test::refusal([&] { meeting(1e4, "", {set}); });
+  };
+  for (const auto& [set, says] : std::vector<std::pair<std::string, std::string>>{
+           {"environment.contact.stiffness=-1", "environment.contact.stiffness: '-1'"},
+           {"environment.contact.friction=nan", "environment.contact.friction: 'nan'"},
+           {"environment.contact.exponent=0.5", "environment.contact.exponent: '0.5'"},
+           {"environment.tool=[]", "environment.tool: has no balls"},
+           {"environment.target.at_m=[0, 0, 0]",
+            "environment.target.at_m: want this or from_tool_m"},
+           {"environment.target.mass_kg=0", "environment.target.mass_kg: '0'"},
+           {"environment.target.from_tool_m=[0.3, 0, 0]",
+            "environment.tool: is 0.0200 m inside a body at the start"},
+           {"environment.bodies=[{at_m: [0, 0, 9], wall: {}}]", "environment.bodies[0].wall"},
+           {"environment.bodies=[{at_m: [0, 0, 9], box: {size_m: [1, 1]}}]",
+            "environment.bodies[0].box.size_m: has 2 entries"},
+           {"environment.gravity=1", "environment.gravity: unknown key"}})
+    EXPECT_NE(said(set).find(says), std::string::npos) << set << ": " << said(set);
+  EXPECT_NE(test::refusal([] {
+              test::experiment("z_sine",
+                               {"environment={tool: [{radius_m: 0}], contact: {stiffness: "
+                                "1}, bodies: [{at_m: [0, 0, 9], half_space: {}}]}"});
+            }).find("there is no robot with a tool"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace ves
