@@ -161,6 +161,22 @@ TEST(ContactInThePlant, WhatFloatsIsLetGoWhenAdmittanceControlBegins) {
   EXPECT_TRUE(met);
 }
 
+// Until then it stands, whatever its velocity will be: a tool at rest on it feels its spring alone.
+TEST(ContactInThePlant, WhatIsHeldStands) {
+  const Experiment e = meeting(300.0, ", damping_s_per_m: 30");
+  plant::Plant plant(e.plant);  // no program lets it go
+  RobotMove move;
+  move.joint = 1;
+  move.target = e.plant.initial_joints(1) + 0.03;
+  ASSERT_TRUE(plant.moveRobot(move));
+  plant.advance(2'000'000'000);
+  plant.sample();
+  const plant::Truth& t = plant.truth();
+  EXPECT_EQ(t.target.p, e.plant.world->environment.target->start.p);
+  ASSERT_LT(t.clearance, -0.01);
+  EXPECT_NEAR(t.contact_To_I.f.norm(), 300.0 * -t.clearance, 1e-3 * t.contact_To_I.f.norm());
+}
+
 /// The same in free space: a base without springs or damping, of so much mass and inertia.
 Interaction afloat(const Experiment& e, double mass, double inertia) {
   std::int64_t duration = 0;

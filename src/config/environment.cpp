@@ -62,13 +62,10 @@ Target readTarget(Section s, const Vec3& tool_I) {
       s, {"ball", "box"},
       {"mass_kg", "at_m", "from_tool_m", "rpy_deg", "velocity_m_per_s", "turning_deg_per_s"});
   // Uniform.
-  if (const Ball* ball = std::get_if<Ball>(&target.shape)) {
+  if (const Ball* ball = std::get_if<Ball>(&target.shape))
     target.I_Bcm_B = 0.4 * target.mass * ball->radius * ball->radius * Mat3::Identity();
-  } else {
-    const Vec3 q = std::get<Box>(target.shape).size.cwiseAbs2();
-    target.I_Bcm_B =
-        (target.mass / 12.0 * Vec3(q.y() + q.z(), q.x() + q.z(), q.x() + q.y())).asDiagonal();
-  }
+  else
+    target.I_Bcm_B = boxInertia(target.mass, std::get<Box>(target.shape).size);
   s.finish();
   return target;
 }

@@ -53,13 +53,17 @@ RigidBody readBody(Section s) {
   return body;
 }
 
+Mat3 boxInertia(double mass, const Vec3& size) {
+  const Vec3 q = size.cwiseAbs2();
+  return (mass / 12.0 * Vec3(q.y() + q.z(), q.x() + q.z(), q.x() + q.y())).asDiagonal();
+}
+
 RigidBody readBox(Section s) {
   RigidBody box;
   box.mass = s.number("mass_kg", 0.0, 1e5);
   const Vec3 size = s.vector("size_m", 3, 0.0, 10.0);
   if (s.has("center_m")) box.p_BoBcm_B = s.vector("center_m", 3, -10.0, 10.0);
-  const Vec3 q = size.cwiseAbs2();
-  box.I_Bcm_B = (box.mass / 12.0 * Vec3(q.y() + q.z(), q.x() + q.z(), q.x() + q.y())).asDiagonal();
+  box.I_Bcm_B = boxInertia(box.mass, size);
   s.finish();
   return box;
 }

@@ -23,6 +23,8 @@ Pose readPose(Section s);
 std::int64_t readTime(Section& s, std::string_view key);
 /// mass_kg, center_m, inertia_kg_m2
 RigidBody readBody(Section s);
+/// [kg m^2] of a uniform box with edges `size` [m], about its centre.
+Mat3 boxInertia(double mass, const Vec3& size);
 /// A uniform box; its centre is at the frame's origin unless `center_m` says otherwise.
 RigidBody readBox(Section s);
 

@@ -2,6 +2,7 @@
 #include "ves/contact/environment.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace ves {

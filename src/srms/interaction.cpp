@@ -165,9 +165,7 @@ class Equations {
 
   void whole(const JointState& q, const VectorXd& y, MatrixXd& A, VectorXd& right) const {
     const Eigen::Index k = modes();
-    BodyMotion P;
-    P.X.R = platform(y).X.R;
-    P.w = base_.Phi.bottomRows<3>() * y.segment(k, k);
+    const BodyMotion P = platform(y);
     // The wrench is affine in the base's acceleration: this much without, the locked mass with it.
     const Wrench F_Po_P = reaction(q, properMotion(P, X_PL0_, Vec3::Zero()));
     right += base_.Phi.transpose() * rotate(P.X.R, F_Po_P).stacked();
