@@ -20,6 +20,7 @@
 #include <thread>
 #include <vector>
 
+#include "ves/analysis/contact.hpp"
 #include "ves/config/experiment.hpp"
 #include "ves/run/run.hpp"
 
@@ -145,10 +146,22 @@ struct Options {
   }
 };
 
+/// Says which contacts of the program are too stiff to be emulated well.
+inline void warnOfContacts(const Experiment& experiment) {
+  const auto stiff = [](const ContactVerdict& one) {
+    return !one.grows && std::abs(one.impact.energy_error) > kMostEnergyError;
+  };
+  const auto all = assessContacts(experiment.controller, experiment.plant, false);
+  if (!std::any_of(all.begin(), all.end(), stiff)) return;
+  for (const ContactVerdict& one : assessContacts(experiment.controller, experiment.plant))
+    if (stiff(one)) fmt::print(stderr, "warning: {}\n", explain(one));
+}
+
 /// Says that admittance control would diverge, and refuses a program that has it.
 inline void warnOfInstability(Experiment& experiment) {
   const std::string why = requireStability(experiment);
   if (!why.empty()) fmt::print(stderr, "warning: {}\n", why);
+  warnOfContacts(experiment);
 }
 
 /// Asks a command for the words that may be completed.

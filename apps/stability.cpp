@@ -6,6 +6,7 @@
 #include "commands.hpp"
 #include "runner.hpp"
 #include "ves/analysis/appendix_e.hpp"
+#include "ves/analysis/contact.hpp"
 #include "ves/analysis/gate.hpp"
 #include "ves/math/dense.hpp"
 #include "ves/results/gnuplot.hpp"
@@ -33,6 +34,8 @@ int showLoop(const Experiment& e) {
     }
     fmt::print("\n");
   }
+  const std::vector<ContactVerdict> contacts = assessContacts(e.controller, e.plant);
+  for (const ContactVerdict& contact : contacts) fmt::print("{}\n", explain(contact));
   const LoopVerdict v = assessStability(e.controller, e.plant);
   if (!v.stable) {
     fmt::print("{}\n", explain(v));
@@ -51,7 +54,9 @@ int showLoop(const Experiment& e) {
         least(m.early >= Margins::kMostTime), 1e3 * m.early, least(m.late >= Margins::kMostTime),
         1e3 * m.late, least(m.delay == Margins::kMostDelay), m.delay);
   }
-  return kDone;
+  const bool grows = !contactsDecay(e.controller, e.plant);
+  if (grows) fmt::print("a contact would grow: admittance control is refused\n");
+  return grows ? kTripped : kDone;
 }
 
 /// A parameter of the loop that a map can run over.
@@ -60,6 +65,7 @@ struct Parameter {
   const char* label;
   double least, most;
   void (*set)(Loop& loop, const Loop& original, double value);
+  bool logarithmic = false;
 };
 const Parameter kParameters[] = {
     {"mass", "robot's inertia, times its own", 0.0, 10000.0,
@@ -69,6 +75,12 @@ const Parameter kParameters[] = {
      }},
     {"mass_error", "robot's inertia, times the controller's model", 0.0, 100.0,
      [](Loop& l, const Loop& o, double v) { l.robot_P = heavier(v, o.robot_P); }},
+    {"contact_stiffness", "stiffness of the contact [N/m]", 1e-3, 1e12,
+     [](Loop& l, const Loop&, double v) {
+       l.contact->damping *= std::sqrt(v / l.contact->stiffness);
+       l.contact->stiffness = v;
+     },
+     true},
     {"rate", "controller rate [Hz]", 1.0, 1000.0,
      [](Loop& l, const Loop&, double v) { l.period = 1.0 / v; }},
     {"K_P", "K_P, times its own", 0.0, 100.0,
@@ -104,7 +116,10 @@ const Parameter kParameters[] = {
 struct MapAxis {
   const Parameter* parameter = nullptr;
   double from = 0.0, to = 0.0;
-  double at(int i, int of) const { return from + (to - from) * i / (of - 1); }
+  double at(int i, int of) const {
+    const double share = static_cast<double>(i) / (of - 1);
+    return parameter->logarithmic ? from * std::pow(to / from, share) : from + share * (to - from);
+  }
 };
 MapAxis axisOf(const std::string& option, const std::string& text) {
   const std::size_t equals = text.find('='), colon = text.find(':');
@@ -138,16 +153,48 @@ constexpr const char* kLook =
     "set terminal pngcairo noenhanced size 1100,640 font 'DejaVu Sans,12' background '#ffffff'\n"
     "set border 3 lc rgb '#555555'\nset tics nomirror out\n";
 
+bool usesContact(const MapAxis& axis) {
+  return std::string_view(axis.parameter->name) == "contact_stiffness";
+}
+
+/// The contact of a scenario that gives the most energy.
+std::optional<ExpectedContact> hardestContact(const Experiment& e) {
+  std::optional<ExpectedContact> out;
+  double most = -HUGE_VAL;
+  for (const ExpectedContact& contact : expectedContacts(e.controller, e.plant)) {
+    const Loop loop = loopOf(e.controller, e.plant, contact.q, Direction::kExtending);
+    const double error = std::abs(
+        impact(leaning(loop, contact, contact.leaning.stiffness), contact.speed).energy_error);
+    if (out && !(error > most)) continue;
+    most = error;
+    out = contact;
+  }
+  return out;
+}
+
 /// Growth of the loop over two of its parameters, the limit drawn in.
 int drawMap(const Experiment& e, const MapAxis& x, const MapAxis& y,
             const std::filesystem::path& folder) {
   constexpr int kPoints = 41;
-  std::string csv =
-      fmt::format("{},{},growth_per_s,frequency_hz\n", x.parameter->name, y.parameter->name);
+  Loop original = loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kExtending);
+  std::string pose = "robot as it stands", of_contact;
+  double speed = 0.0;
+  if (const auto contact = hardestContact(e)) {
+    original = leaning(loopOf(e.controller, e.plant, contact->q, Direction::kExtending), *contact,
+                       contact->leaning.stiffness);
+    pose = "contact with " + contact->name;
+    of_contact = ",energy_error";
+    speed = contact->speed;
+  } else if (usesContact(x) || usesContact(y)) {
+    throw InputError(
+        fmt::format("{}: contact_stiffness of a scenario that touches nothing in "
+                    "admittance control",
+                    e.name));
+  }
+  std::string csv = fmt::format("{},{},growth_per_s,frequency_hz{}\n", x.parameter->name,
+                                y.parameter->name, of_contact);
   std::string data;
   const bool shown = isatty(STDERR_FILENO) != 0;
-  const Loop original =
-      loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kExtending);
   for (int j = 0; j < kPoints; ++j) {
     for (int i = 0; i < kPoints; ++i) {
       Loop loop = original;
@@ -155,8 +202,9 @@ int drawMap(const Experiment& e, const MapAxis& x, const MapAxis& y,
       const Loop half = loop;
       y.parameter->set(loop, y.parameter == x.parameter ? original : half, y.at(j, kPoints));
       const DominantRoot s = dominantRoot(loop);
-      csv +=
-          fmt::format("{},{},{},{}\n", x.at(i, kPoints), y.at(j, kPoints), s.growth, s.frequency);
+      csv += fmt::format("{},{},{},{}", x.at(i, kPoints), y.at(j, kPoints), s.growth, s.frequency);
+      if (loop.contact) csv += fmt::format(",{}", impact(loop, speed).energy_error);
+      csv += "\n";
       data += fmt::format("{} {} {}\n", x.at(i, kPoints), y.at(j, kPoints), s.growth);
     }
     data += "\n";
@@ -170,13 +218,13 @@ int drawMap(const Experiment& e, const MapAxis& x, const MapAxis& y,
            "set palette defined (-1 '#2166ac', 0 '#f7f7f7', 1 '#b2182b')\n"
            "set cbrange [-3:3]\nset view map\nset contour base\n"
            "set cntrparam levels discrete 0\nset pm3d map interpolate 4,4\nunset key\n"
-           "set xrange [{}:{}]\nset yrange [{}:{}]\n"
+           "set xrange [{}:{}]\nset yrange [{}:{}]\n{}{}"
            "splot $map with pm3d, $map with lines lw 2.5 lc rgb 'black' nosurface\n",
            data, kLook,
-           quoted(
-               e.name +
-               ": blue decays, red diverges, line: the limit. Legs extending, robot as it stands"),
-           quoted(x.parameter->label), quoted(y.parameter->label), x.from, x.to, y.from, y.to),
+           quoted(e.name + ": blue decays, red diverges, line: the limit. Legs extending, " + pose),
+           quoted(x.parameter->label), quoted(y.parameter->label), x.from, x.to, y.from, y.to,
+           x.parameter->logarithmic ? "set logscale x\n" : "",
+           y.parameter->logarithmic ? "set logscale y\n" : ""),
        folder, "map.png");
   return kDone;
 }
@@ -235,9 +283,10 @@ int stabilityCommand(int argc, char** argv) {
       "scenario figure E.4");
   std::string scenario, x = "mass=0.1:4", y = "frequency=0.2:3", out = "ves-runs/stability";
   map->add_option("scenario", scenario, "name in config/scenarios, or a .yaml file");
-  map->add_option(
-         "--x", x,
-         "NAME=FROM:TO: mass, mass_error, rate, K_P, late, delay, filter, sensor, frequency, modes")
+  map->add_option("--x", x,
+                  "NAME=FROM:TO: mass, mass_error, contact_stiffness, rate, K_P, late, delay, "
+                  "filter, sensor, "
+                  "frequency, modes")
       ->capture_default_str();
   map->add_option("--y", y, "the same")->capture_default_str();
   map->add_option("--set", options.overrides, "KEY.PATH=VALUE as if it stood in the scenario")

@@ -54,6 +54,7 @@ TEST(Config, EveryMachineNumberIsTheReportsOrTagged) {
                                         "gain_retract_in_per_s_per_ma",
                                         "tau_s",
                                         "counts_per_in",
+                                        "enabled",
                                         "feed_forward",
                                         "observer",
                                         "inertia",

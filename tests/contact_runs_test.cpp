@@ -7,7 +7,9 @@
 #include "support/rig.hpp"
 #include "ves/config/experiment.hpp"
 #include "ves/plant/plant.hpp"
+#include "ves/results/summary.hpp"
 #include "ves/srms/interaction.hpp"
+#include "ves/transport/messages.hpp"
 
 namespace ves {
 namespace {
@@ -177,6 +179,24 @@ TEST(ContactInThePlant, WhatIsHeldStands) {
   EXPECT_NEAR(t.contact_To_I.f.norm(), 300.0 * -t.clearance, 1e-3 * t.contact_To_I.f.norm());
 }
 
+// Its time is that of the message, whatever the plant's own clock says.
+TEST(ContactInThePlant, IsToldByTheMessagesClock) {
+  plant::Plant plant = alone(meeting(1e4));
+  plant.advance(1'000'000'000);
+  plant.sample();
+  const plant::Truth& t = plant.truth();
+  const std::int64_t later = 7'000'000'000'000;
+  const truth_t m = toMessage(t, header({}, 0, t.time + later));
+  EXPECT_EQ(m.contacts, 1);
+  EXPECT_EQ(m.touching, 0);
+  EXPECT_NEAR(m.contact_began, 7000.0 + t.contacts.last().began, 1e-9);
+  EXPECT_NEAR(t.contacts.last().began, 0.005 / kSpeed, 1e-3);
+  EXPECT_EQ(m.contact_peak, t.contacts.last().peak);
+  EXPECT_EQ(m.contact_separation, t.contacts.last().separation);
+  EXPECT_LT((Vec3::Map(m.target_p) - t.target.p).norm(), 1e-15);
+  EXPECT_GT(m.clearance, 0.0);
+}
+
 /// The same in free space: a base without springs or damping, of so much mass and inertia.
 Interaction afloat(const Experiment& e, double mass, double inertia) {
   std::int64_t duration = 0;
@@ -284,6 +304,117 @@ TEST(ContactInFreeSpace, DampingGoesByTheRateOfTheDepth) {
   EXPECT_GT(turned, 5e-3);
 }
 
+// A base too heavy to move is a platform that is held: the plant's steps against GSL's, which stop
+// where the contact begins and ends.
+TEST(ContactInThePlant, IsThatOfAnIndependentIntegration) {
+  for (const double k : {3e3, 1e4, 3e5})
+    for (const std::string& law : {std::string(), std::string(", exponent: 1.5"),
+                                   std::string(", damping_s_per_m: 20, friction: 0.3")}) {
+      Experiment e = meeting(k, law, {"environment.target.turning_deg_per_s=[0, 20, 0]"});
+      const Interaction i = afloat(e, 1e9, 1e9);
+      InteractionOptions options;
+      options.model = InteractionModel::kWhole;
+      options.duration = 3'000'000'000;
+      const Contact due = simulate(i, options).back().contacts.last();
+      plant::Plant plant = alone(e);
+      plant.advance(3'000'000'000);
+      plant.sample();
+      const Contact& met = plant.truth().contacts.last();
+      ASSERT_TRUE(due.over() && met.over()) << k << law;
+      EXPECT_NEAR(met.restitution(), due.restitution(), 0.01 * due.restitution()) << k << law;
+      EXPECT_NEAR(met.duration, due.duration, 0.01 * due.duration) << k << law;
+      EXPECT_NEAR(met.peak, due.peak, 0.01 * due.peak) << k << law;
+      EXPECT_LT((met.impulse - due.impulse).norm(), 0.01 * due.impulse.norm()) << k << law;
+      EXPECT_NEAR(met.began, due.began, 2e-3) << k << law;
+    }
+}
+
+// The events that stop its steps are where the closed form has them.
+TEST(ContactInFreeSpace, EventsAreLocated) {
+  const double k = 1e4, base = 400.0;
+  const Interaction i = afloat(meeting(k), base, 1e12);
+  const double M = base + compositeBody(ves::carried(i.payload), i.q0).mass,
+               mu = M * kMass / (M + kMass);
+  InteractionOptions options;
+  options.model = InteractionModel::kWhole;
+  options.duration = 1'500'000'000;
+  const InteractionPoint end = simulate(i, options).back();
+  ASSERT_EQ(end.contacts.count(), 1);
+  const Contact& c = end.contacts.last();
+  EXPECT_NEAR(c.began, 0.005 / kSpeed, 1e-9);
+  EXPECT_NEAR(c.duration, M_PI * std::sqrt(mu / k), 1e-7);
+  EXPECT_NEAR(c.peak, kSpeed * std::sqrt(k * mu), 3e-3 * c.peak);
+  EXPECT_NEAR(c.impulse.norm(), 2.0 * mu * kSpeed, 1e-3 * c.impulse.norm());
+  EXPECT_NEAR(c.restitution(), 1.0, 1e-6);
+}
+
+/// With a hand that closes on the ball as it comes.
+Experiment capture(const std::vector<std::string>& more = {}) {
+  std::vector<std::string> set = {
+      "environment.grip={stiffness_n_per_m: 3000, damping_n_s_per_m: 600, "
+      "turn_stiffness_nm_per_rad: 300, turn_damping_nm_s_per_rad: 60, reach_m: 0.006}",
+      "program=[{move: {}}, {calibration: {}}, {admittance: {duration_s: 4}, robot: [{at_s: 0.2, "
+      "grasp: {target: true}}, {at_s: 3, release: {}}]}]"};
+  set.insert(set.end(), more.begin(), more.end());
+  return meeting(1e4, "", set);
+}
+
+// Base, robot and ball become one body: momenta stay, and their velocities agree.
+TEST(ContactInFreeSpace, WhatIsGraspedGoesAlong) {
+  const Experiment e = capture();
+  std::int64_t duration = 0;
+  const std::vector<TimedAction> actions = interactionOf(e, duration).actions;
+  ASSERT_EQ(actions.size(), 2U);
+  Interaction i = afloat(e, 400.0, 1e12);
+  i.actions = actions;
+  InteractionOptions options;
+  options.model = InteractionModel::kWhole;
+  options.duration = duration;
+  const std::vector<InteractionPoint> points = simulate(i, options);
+  const double M = 400.0 + compositeBody(ves::carried(i.payload), i.q0).mass;
+  for (const InteractionPoint& p : points)
+    EXPECT_NEAR(M * p.x_dot.x() + kMass * p.target.v.x(), -kMass * kSpeed, 1e-9) << p.t;
+  const double together = -kMass * kSpeed / (M + kMass);
+  for (const double t : {2.5, 3.5}) {  // held, and let go
+    const InteractionPoint& p = points[static_cast<std::size_t>(std::lround(t / 0.01))];
+    EXPECT_EQ(p.target.X_TB.has_value(), t < 3.0);
+    EXPECT_NEAR(p.target.v.x(), together, 1e-5);
+    EXPECT_NEAR(p.x_dot.x(), together, 1e-5);
+  }
+}
+
+// The machine does it too: in the plant, over the program, beside free space.
+TEST(ContactInThePlant, ATargetIsGraspedAndLetGo) {
+  Experiment e =
+      capture({"controller.compensation.feed_forward=true", "controller.compensation.observer=true",
+               "controller.compensation.inertia=true", "sensor.readings_per_tick=4"});
+  Lockstep machine(e.controller, e.plant);
+  machine.step({Request::kStart, {}, {}});
+  double held = 0.0, apart = 0.0;
+  while (!test::done(machine.state())) {
+    machine.step();
+    const plant::Truth& t = machine.plant().truth();
+    if (!t.target.X_TB) continue;
+    held += e.controller.periodSeconds();
+    const Transform X_IT = t.P.X * e.plant.payload.X_PL0() *
+                           e.robot.tool()->pose(linkPoses(e.plant.payload.robot, t.joints.q));
+    apart = (t.target.p - (X_IT * *t.target.X_TB).p).norm();
+  }
+  EXPECT_EQ(machine.state().phase, Phase::kParked);
+  EXPECT_EQ(machine.plant().refusedEvents(), 0);
+  EXPECT_NEAR(held, 2.8, 0.05);
+  EXPECT_LT(apart, 2e-3);  // it has come to rest in the hand
+  EXPECT_FALSE(machine.plant().truth().target.X_TB);
+}
+
+TEST(ContactInThePlant, AHandThatIsTooFarAwayHoldsNothing) {
+  Experiment e = capture({"environment.grip.reach_m=0.0001"});
+  Lockstep machine(e.controller, e.plant);
+  machine.step({Request::kStart, {}, {}});
+  while (!test::done(machine.state())) machine.step();
+  EXPECT_EQ(machine.plant().refusedEvents(), 2);  // nothing to let go either
+}
+
 TEST(ContactInFreeSpace, AWorldThatNobodyTouchesChangesNothing) {
   std::int64_t duration = 0;
   const Experiment with = meeting(1e4, "",
@@ -304,6 +435,56 @@ TEST(ContactInFreeSpace, AWorldThatNobodyTouchesChangesNothing) {
   EXPECT_GT(moved, 1e-3);
 }
 
+// What a run says of its contacts, beside what the plant knew and free space.
+TEST(ContactResults, StandBesideFreeSpace) {
+  const Experiment e = test::experiment("contact_rebound_puma", {"sensor.noise=false"});
+  const RecordedRun run = recordLockstep(e);
+  ASSERT_EQ(run.result.phase, Phase::kParked);
+  Lockstep machine(e.controller, e.plant);
+  machine.step({Request::kStart, {}, {}});
+  double began = -1.0;
+  while (!test::done(machine.state())) {
+    const TickState& s = machine.step();
+    if (began < 0.0 && s.kind == SegmentKind::kAdmittance)
+      began = static_cast<double>(machine.plant().truth().time) * 1e-9;
+  }
+  const Contact& known = machine.plant().truth().contacts.last();
+  const nlohmann::ordered_json s = summarise(run.series, run.result);
+  EXPECT_EQ(s["contacts"], 1);
+  EXPECT_EQ(s["contacts_free_space"], 1);
+  const auto& one = s["contact_list"][0];
+  EXPECT_NEAR(one["began_s"].get<double>(), known.began - began, 1e-9);
+  EXPECT_EQ(one["duration_s"], known.duration);
+  EXPECT_EQ(one["peak_n"], known.peak);
+  EXPECT_EQ(one["impulse_ns"], known.impulse.norm());
+  EXPECT_EQ(one["approach_m_per_s"], known.approach);
+  EXPECT_EQ(one["restitution"], known.restitution());
+  // The compensated machine is close to free space.
+  for (const char* figure : {"duration_s", "peak_n", "impulse_ns", "approach_m_per_s"}) {
+    const double due = one[std::string("free_space_") + figure];
+    EXPECT_NEAR(one[figure].get<double>(), due, 0.03 * due) << figure;
+  }
+  EXPECT_NEAR(one["began_s"].get<double>(), one["free_space_began_s"].get<double>(), 0.02);
+  const double e_ = s["contact_restitution"], due = s["contact_restitution_free_space"];
+  EXPECT_NEAR(e_, due, 0.03);
+  EXPECT_NEAR(s["contact_energy_error"].get<double>(), e_ * e_ - due * due, 1e-12);
+  EXPECT_EQ(s["contact_peak_n"], known.peak);
+  EXPECT_LT(std::abs(s["energy_put_in_j"].get<double>()), 2e-3);
+  EXPECT_FALSE(s.contains("energy_paid_j"));
+  EXPECT_LT(std::abs(s["tracking_delay_s"].get<double>()), 2e-3);
+  EXPECT_NE(table(s).find("contact  1 in the run, 1 on the base in free space"), std::string::npos);
+  // The table's columns are those of the truth.
+  const std::vector<Column> all = columns(e);
+  const auto last = [&](const std::string& name) {
+    for (const Column& column : all)
+      if (column.name == name) return column.value(run.series.rows.back());
+    return double(NAN);
+  };
+  EXPECT_EQ(last("contacts"), 1.0);
+  EXPECT_NEAR(last("x_target_rate_m_per_s"), machine.plant().truth().target.v.x(), 1e-12);
+  EXPECT_GT(last("clearance_m"), 0.0);
+}
+
 TEST(ContactConfig, IsRefusedByName) {
   const auto said = [&](const std::string& set) {
     return test::refusal([&] { meeting(1e4, "", {set}); });
@@ -318,6 +499,12 @@ TEST(ContactConfig, IsRefusedByName) {
            {"environment.target.mass_kg=0", "environment.target.mass_kg: '0'"},
            {"environment.target.from_tool_m=[0.3, 0, 0]",
             "environment.tool: is 0.0200 m inside a body at the start"},
+           {"environment.grip={stiffness_n_per_m: 0}", "environment.grip.stiffness_n_per_m: '0'"},
+           {"environment.grip={stiffness_n_per_m: 1, damping_n_s_per_m: 0, "
+            "turn_stiffness_nm_per_rad: 1, turn_damping_nm_s_per_rad: 0, reach_m: 2}",
+            "environment.grip.reach_m: '2'"},
+           {"program=[{admittance: {duration_s: 3}, robot: [{at_s: 1, grasp: {target: true}}]}]",
+            "grasp.target: there is none, or no grip"},
            {"environment.bodies=[{at_m: [0, 0, 9], wall: {}}]", "environment.bodies[0].wall"},
            {"environment.bodies=[{at_m: [0, 0, 9], box: {size_m: [1, 1]}}]",
             "environment.bodies[0].box.size_m: has 2 entries"},

@@ -5,7 +5,7 @@
 
 #include <random>
 
-#include "ves/contact/environment.hpp"
+#include "ves/contact/contact_watch.hpp"
 
 namespace ves {
 namespace {
@@ -33,12 +33,13 @@ struct Bounce {
 /// The tool stands at the origin until the ball is gone again; `dt` [s] a look, `step` [s].
 Bounce bounce(const Environment& e, double dt, double step) {
   Bounce out;
+  ContactWatch watch;
   Floating body = e.target->start;
   const FrameMotion still;
   const double before = -body.v.z();
   double impulse_time = 0.0;
   for (int k = 0; k < 2'000'000; ++k) {
-    const Touch mean = advance(e, still, still, dt, step, body);
+    const Touch mean = advance(e, still, still, 0.0, dt, step, body, watch);
     out.peak = std::max(out.peak, touch(e, still, body).on_target_Bo_I.f.norm());
     if (mean.on_target_Bo_I.f.norm() > 0.0) impulse_time += dt;
     if (body.v.z() > 0.0 && mean.least > 1e-4) break;
@@ -222,14 +223,15 @@ TEST(Contact, TheToolIsFollowedBetweenTwoLooks) {
     return m;
   };
   Floating none;
-  const Touch mean = advance(e, at(0.0), at(T), T, T / 20.0, none);
+  ContactWatch watch;
+  const Touch mean = advance(e, at(0.0), at(T), 0.0, T, T / 20.0, none, watch);
   EXPECT_NEAR(mean.on_tool_To_I.f.z(), 1e4 * 1e-3 * (1.0 + 0.5 + 1.0 / 3.0 - 0.25), 1e-9);
   // A point on a lever that swings from 0 to 0.2 rad below the wall.
   e.tool = {{Vec3(0.5, 0.0, 0.0), 0.0}};
   FrameMotion level, low;
   low.X.R = rotation({0.0, 0.2, 0.0});
   level.w = low.w = Vec3(0.0, 0.2 / T, 0.0);
-  const Touch swung = advance(e, level, low, T, T / 20.0, none);
+  const Touch swung = advance(e, level, low, 0.0, T, T / 20.0, none, watch);
   EXPECT_NEAR(swung.on_tool_To_I.f.z(), 1e4 * 0.5 * (1.0 - std::cos(0.2)) / 0.2, 1e-4);
 }
 
@@ -247,14 +249,15 @@ TEST(Contact, WhatFloatsFreelyKeepsItsBooks) {
   };
   const Floating start = body;
   const FrameMotion nowhere;
-  for (int k = 0; k < 2000; ++k) advance(e, nowhere, nowhere, 1e-3, 1e-3, body);
+  ContactWatch watch;
+  for (int k = 0; k < 2000; ++k) advance(e, nowhere, nowhere, 0.0, 1e-3, 1e-3, body, watch);
   EXPECT_LT((body.p - start.p - 2.0 * start.v).norm(), 1e-12);
   EXPECT_LT((angular(body) - angular(start)).norm(), 1e-9);
   EXPECT_NEAR(body.w.dot(angular(body)), start.w.dot(angular(start)), 1e-9);
   EXPECT_GT((body.w - start.w).norm(), 0.1);  // it does tumble
   e.gravity = {0.0, 0.0, -9.81};
   Floating falling = start;
-  for (int k = 0; k < 100; ++k) advance(e, nowhere, nowhere, 1e-2, 1e-3, falling);
+  for (int k = 0; k < 100; ++k) advance(e, nowhere, nowhere, 0.0, 1e-2, 1e-3, falling, watch);
   EXPECT_NEAR(falling.v.z(), start.v.z() - 9.81, 1e-9);
   EXPECT_NEAR(falling.p.z(), start.p.z() + start.v.z() - 0.5 * 9.81, 1e-9);
 }
@@ -268,11 +271,12 @@ TEST(Contact, TheMeanOverAStepIsTheImpulse) {
   FrameMotion a, b;
   a.v = b.v = {0.01, 0.0, 0.0};
   const double dt = 1e-3;
+  ContactWatch watch;
   for (int k = 0; k < 100; ++k) {
     a.X.p = 1e-5 * k * Vec3::UnitX();
     b.X.p = 1e-5 * (k + 1) * Vec3::UnitX();
     const Floating before = body;
-    const Touch mean = advance(e, a, b, dt, 5e-5, body);
+    const Touch mean = advance(e, a, b, 0.0, dt, 5e-5, body, watch);
     EXPECT_LT((60.0 * (body.v - before.v) - dt * mean.on_target_Bo_I.f).norm(), 1e-12);
     const double I = 0.4 * 60.0 * 0.09;  // a ball's: no gyroscopic term
     EXPECT_LT((I * (body.w - before.w) - dt * mean.on_target_Bo_I.n).norm(), 1e-10);
@@ -282,7 +286,7 @@ TEST(Contact, TheMeanOverAStepIsTheImpulse) {
 
 // A mass meets a spring whose force comes tau late: e = exp(pi omega tau / 2) to first order.
 TEST(Contact, AForceThatIsLateGivesEnergy) {
-  for (const double omega_tau : {0.02, 0.05, 0.1}) {
+  for (const double omega_tau : {0.02, 0.05, 0.1, 0.2, 0.28}) {
     const double m = 100.0, k = 1e4, omega = std::sqrt(k / m), tau = omega_tau / omega, v = 0.02;
     const ContactLaw law{k, 1.0, 0.0, 0.0, 1e-3};
     const int late = 200;
@@ -339,6 +343,142 @@ TEST(Contact, AToolMovesAsItsJointsAndItsBaseMoveIt) {
   EXPECT_LT((now.v - (later.X.p - before.X.p) / (2.0 * h)).norm(), 1e-8);
   const Mat3 W = (later.X.R - before.X.R) / (2.0 * h) * now.X.R.transpose();
   EXPECT_LT((now.w - Vec3(W(2, 1), W(0, 2), W(1, 0))).norm(), 1e-8);
+}
+
+// Events, by closed form: a ball rebounds from a tool that stands, and comes again.
+TEST(ContactWatch, KnowsWhenHowHardAndWithWhatARebound) {
+  const double k = 1e4, m = 100.0, v = 0.02, omega = std::sqrt(k / m);
+  const Environment e = drifting({k, 1.0, 0.0, 0.0, 1e-3}, m, v);
+  Floating body = e.target->start;
+  ContactWatch watch;
+  const FrameMotion still;
+  const double dt = 1e-3;
+  int touching = 0;
+  for (int i = 0; i < 1000; ++i) {
+    advance(e, still, still, i * dt, dt, 5e-5, body, watch);
+    touching += watch.touching();
+    if (!watch.last().over() && i > 500) {
+      EXPECT_TRUE(watch.touching()) << "the speed after it is known 10 ms later";
+    }
+  }
+  const Contact& c = watch.last();
+  EXPECT_EQ(watch.count(), 1);
+  EXPECT_FALSE(watch.touching());
+  EXPECT_NEAR(touching * dt, M_PI / omega, 2.0 * dt);
+  EXPECT_NEAR(c.began, 1e-3 / v, 1e-6);
+  EXPECT_NEAR(c.duration, M_PI / omega, 1e-4);
+  EXPECT_NEAR(c.peak, v * std::sqrt(k * m), 1e-4 * c.peak);
+  EXPECT_NEAR(c.impulse.z(), -2.0 * m * v, 1e-4 * 2.0 * m * v);
+  EXPECT_NEAR(c.approach, v, 1e-6);
+  EXPECT_NEAR(c.separation, v, 1e-5);
+  // Another one begins anew.
+  body.v.z() = -0.5 * v;
+  for (int i = 1000; i < 3500; ++i) advance(e, still, still, i * dt, dt, 5e-5, body, watch);
+  EXPECT_EQ(watch.count(), 2);
+  EXPECT_NEAR(watch.last().peak, 0.5 * v * std::sqrt(k * m), 1e-4 * c.peak);
+  EXPECT_NEAR(watch.last().restitution(), 1.0, 1e-3);
+}
+
+// A rate that swings about its mean, as a platform's does within a period: the mean counts.
+TEST(ContactWatch, TakesMeanSpeeds) {
+  ContactWatch watch;
+  const auto gap = [](double t) {  // closes at 3 cm/s, and opens at 2, with 30 % of ripple
+    const double ripple = 0.3 * 0.01 / (2.0 * M_PI) * std::sin(2.0 * M_PI * t / 0.01);
+    return t < 1.0 ? -0.03 * (t - 0.9 + ripple) : -3e-3 + 0.02 * (t - 1.0 + ripple);
+  };
+  for (int i = 0; i < 20000; ++i) {
+    const double t = 1e-4 * i;
+    Touch touch;
+    touch.least = gap(t);
+    touch.closing = -(gap(t + 1e-6) - gap(t)) / 1e-6;
+    if (touch.least < 0.0) touch.pressed = {1.0, 0.0, 0.0};
+    watch.see(t, touch);
+  }
+  EXPECT_EQ(watch.count(), 1);
+  EXPECT_NEAR(watch.last().approach, 0.03, 0.03 * 0.05);
+  EXPECT_NEAR(watch.last().separation, 0.02, 0.02 * 0.05);
+  EXPECT_NEAR(watch.last().duration, 0.1 + 0.15, 2e-3);
+  EXPECT_NEAR(watch.last().impulse.x(), watch.last().duration, 1e-4);
+}
+
+TEST(ContactWatch, CountsABounceThatComesAtOnce) {
+  ContactWatch watch;
+  for (int i = 0; i < 2000; ++i) {
+    Touch touch;
+    touch.least = 1e-4 * std::cos(2.0 * M_PI * i / 100.0);  // every 10 ms, of which 5 free
+    touch.closing = 0.06 * std::sin(2.0 * M_PI * i / 100.0);
+    watch.see(1e-4 * i, touch);
+  }
+  EXPECT_EQ(watch.count(), 20);
+  EXPECT_TRUE(watch.last().approach > 0.0);
+}
+
+/// A tool that goes along x at 0.1 m/s and turns; a ball before it.
+Environment gripping(Floating& body, FrameMotion& tool) {
+  Environment e = drifting({1e4, 1.0, 0.0, 0.0, 1e-3}, 50.0, 0.0);
+  e.grip = Grip{2e4, 400.0, 2e3, 60.0, 5e-3};
+  body = e.target->start;
+  tool.v = {0.1, 0.0, 0.0};
+  tool.w = {0.0, 0.0, 0.2};
+  return e;
+}
+
+// It is dragged along as if it were part of the tool.
+TEST(Grip, TakesTheTargetAlongWhereItWasTaken) {
+  Floating body;
+  FrameMotion tool;
+  const Environment e = gripping(body, tool);
+  EXPECT_FALSE(grasp({}, tool, body));
+  Floating far = body;
+  far.p.z() += 0.01;
+  EXPECT_FALSE(grasp(e, tool, far)) << "out of reach";
+  ASSERT_TRUE(grasp(e, tool, body));
+  EXPECT_FALSE(grasp(e, tool, body)) << "it is held already";
+  const Transform X_TB = *body.X_TB;
+  EXPECT_LT((X_TB.p - Vec3(0.0, 0.0, 0.321)).norm(), 1e-12);
+  ContactWatch watch;
+  const double dt = 1e-3;
+  for (int i = 0; i < 3000; ++i) {
+    FrameMotion next = tool;
+    next.X.p += dt * tool.v;
+    next.X.R = rotationOf(dt * tool.w) * tool.X.R;
+    advance(e, tool, next, i * dt, dt, 5e-5, body, watch);
+    tool = next;
+  }
+  const Transform due = tool.X * X_TB;
+  EXPECT_LT((body.p - due.p).norm(), 1e-4);
+  EXPECT_LT((body.X_IB().R - due.R).norm(), 1e-3);
+  EXPECT_LT((body.v - (tool.v + tool.w.cross(body.p - tool.X.p))).norm(), 1e-3);
+  EXPECT_LT((body.w - tool.w).norm(), 1e-3);
+  EXPECT_EQ(watch.count(), 0) << "what is held is not touched";
+}
+
+// Action and reaction, about one point.
+TEST(Grip, PushesBackOnTheTool) {
+  Floating body;
+  FrameMotion tool;
+  const Environment e = gripping(body, tool);
+  ASSERT_TRUE(grasp(e, tool, body));
+  body.p += Vec3(0.003, -0.002, -0.004);  // into the ball: what is held is not touched
+  body.q = Eigen::Quaterniond(rotation({0.02, -0.01, 0.03}));
+  body.v = {0.01, 0.05, -0.02};
+  body.w = {0.3, -0.1, 0.2};
+  const Touch t = touch(e, tool, body);
+  EXPECT_GT(t.on_target_Bo_I.f.norm(), 10.0);
+  EXPECT_LT((t.on_target_Bo_I.f + t.on_tool_To_I.f).norm(), 1e-12);
+  const Vec3 about_tool = t.on_target_Bo_I.n + (body.p - tool.X.p).cross(t.on_target_Bo_I.f);
+  EXPECT_LT((about_tool + t.on_tool_To_I.n).norm(), 1e-12);
+  // A spring and a damper, by hand.
+  const Vec3 off(0.003, -0.002, -0.004), slip = body.v - (tool.v + tool.w.cross(body.p - tool.X.p));
+  EXPECT_LT((t.on_target_Bo_I.f + 2e4 * off + 400.0 * slip).norm(), 1e-9);
+  EXPECT_NEAR(
+      t.stored,
+      0.5 * 2e4 * off.squaredNorm() + 0.5 * 2e3 * std::pow(Eigen::AngleAxisd(body.q).angle(), 2),
+      1e-9);
+  EXPECT_LT((t.on_target_Bo_I.n + 60.0 * (body.w - tool.w) +
+             2e3 * Eigen::AngleAxisd(body.q).angle() * Eigen::AngleAxisd(body.q).axis())
+                .norm(),
+            1e-9);
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/analysis/gate.hpp"
+#include "ves/analysis/contact.hpp"
 #include "ves/base/coordinates.hpp"
 
 #include <fmt/format.h>
@@ -144,6 +145,17 @@ bool isStable(const ControllerConfig& controller, const plant::PlantConfig& plan
          !cornerThatGrows(controller, plant, robots);
 }
 
+bool contactsDecay(const ControllerConfig& controller, const plant::PlantConfig& plant) {
+  if (controller.passivity.enabled) return true;
+  const std::vector<ExpectedContact> contacts = expectedContacts(controller, plant);
+  return std::all_of(contacts.begin(), contacts.end(), [&](const ExpectedContact& contact) {
+    return std::all_of(std::begin(kBoth), std::end(kBoth), [&](Direction direction) {
+      return !growsLeaning(leaning(loopOf(controller, plant, contact.q, direction), contact,
+                                   contact.leaning.stiffness));
+    });
+  });
+}
+
 LoopVerdict assessStability(const ControllerConfig& controller, const plant::PlantConfig& plant) {
   LoopVerdict out;
   out.modes = static_cast<int>(controller.admittance.stiffness.size());
@@ -219,7 +231,8 @@ std::string explain(const LoopVerdict& v) {
 
 std::string applyStabilityCheck(ControllerConfig& controller, const plant::PlantConfig& plant) {
   const auto verdict = [&](const ControllerConfig& c) {
-    return isStable(c, plant) ? Stability::kStable : Stability::kUnstable;
+    return isStable(c, plant) && contactsDecay(c, plant) ? Stability::kStable
+                                                         : Stability::kUnstable;
   };
   const bool forced = controller.stability == Stability::kForced;
   const Stability as_is = verdict(controller);
@@ -231,7 +244,12 @@ std::string applyStabilityCheck(ControllerConfig& controller, const plant::Plant
   }
   controller.stability = as_is;
   if (forced) controller.stability = controller.stability_uncompensated = Stability::kForced;
-  return as_is == Stability::kStable ? "" : explain(assessStability(controller, plant));
+  if (as_is == Stability::kStable) return "";
+  if (!isStable(controller, plant)) return explain(assessStability(controller, plant));
+  std::string why;
+  for (const ContactVerdict& one : assessContacts(controller, plant))
+    if (one.grows) why += (why.empty() ? "" : "; ") + explain(one);
+  return why;
 }
 
 }  // namespace ves

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <deque>
 #include <utility>
 #include <vector>
 
+#include "channel.hpp"
 #include "ves/math/dense.hpp"
 #include "ves/math/second_order.hpp"
 #include "ves/plant/nominal_servo.hpp"
@@ -21,257 +21,71 @@ using Eigen::MatrixXd;
 using Eigen::RowVectorXd;
 using Eigen::VectorXd;
 
-/// Leg and sensor of one direction, between two updates: x' = A x + B v_end, where v_end is the
-/// speed that the valve's current leads to. x = {length, speed, Filter 3 (3), sensor (2)}.
-struct Mechanics {
-  static constexpr Index kSize = 7, kLength = 0, kSpeed = 1, kFilter = 2, kSensor = 5;
-  MatrixXd A = MatrixXd::Zero(kSize, kSize);
-  VectorXd B = VectorXd::Zero(kSize);
-};
-
-Mechanics mechanicsOf(const Loop& loop) {
-  Mechanics m;
-  constexpr Index y = Mechanics::kLength, v = Mechanics::kSpeed, f = Mechanics::kFilter,
-                  s = Mechanics::kSensor;
-  m.A(y, v) = 1.0;
-  m.A(v, v) = -1.0 / loop.tau;
-  m.B(v) = 1.0 / loop.tau;
-  // The acceleration (v_end - v) / tau goes into Filter 3, a real pole and a pair, or past it.
-  const double w3 = loop.filter_cutoff, w = loop.sensor_cutoff;
-  const bool filtered = w3 > 0.0;
-  if (filtered) {
-    m.A(f, f) = -w3;
-    m.A(f, v) = -w3 / loop.tau;
-    m.B(f) = w3 / loop.tau;
-    m.A(f + 1, f + 2) = 1.0;
-    m.A(f + 2, f) = w3 * w3;
-    m.A(f + 2, f + 1) = -w3 * w3;
-    m.A(f + 2, f + 2) = -w3;
-  } else  // states that nothing reads, and that must not be roots
-    m.A.block<3, 3>(f, f) = -w * Mat3::Identity();
-  m.A(s, s + 1) = 1.0;
-  m.A(s + 1, s) = -w * w;
-  m.A(s + 1, s + 1) = -M_SQRT2 * w;
-  if (filtered) {
-    m.A(s + 1, f + 1) = w * w;
-  } else {
-    m.A(s + 1, v) = -w * w / loop.tau;
-    m.B(s + 1) = w * w / loop.tau;
-  }
-  return m;
-}
-
-/// Passes of one generator over lengths of time, each computed once.
-class Passes {
- public:
-  explicit Passes(MatrixXd generator) : generator_(std::move(generator)) {}
-  const MatrixXd& over(double dt) {
-    constexpr double kSame = 1e-12;  // [s]
-    const auto known = std::find_if(known_.begin(), known_.end(), [&](const auto& one) {
-      return std::abs(one.first - dt) < kSame;
-    });
-    if (known != known_.end()) return known->second;
-    return known_.emplace_back(dt, exponential(generator_ * dt)).second;
-  }
-
- private:
-  MatrixXd generator_;
-  std::deque<std::pair<double, MatrixXd>> known_;
-};
-
-/// What happens at once, `time` [s] after a tick.
-struct Event {
-  double time;
-  MatrixXd change;
-};
-
-/// From a tick to the next one, through the events.
-MatrixXd throughPeriod(double period, std::vector<Event> events, const MatrixXd& generator) {
-  std::stable_sort(events.begin(), events.end(),
-                   [](const Event& a, const Event& b) { return a.time < b.time; });
-  Passes passes(generator);
-  MatrixXd all = MatrixXd::Identity(generator.rows(), generator.cols());
-  double now = 0.0;
-  for (const Event& event : events) {
-    all = event.change * passes.over(event.time - now) * all;
-    now = event.time;
-  }
-  return passes.over(period - now) * all;
-}
-
-/// One direction over a controller period: z <- step z + from_command u; the first of z is the
-/// length. `felt` z is the acceleration as the wrench shows it at the tick.
-struct Channel {
-  MatrixXd step;
-  VectorXd from_command;
-  RowVectorXd felt;
-};
-
-/// z = {mechanics, v_end, the first reading of the pair to come, X(k-1) .. X(k-4), the converter's
-/// sum}, without what nothing reads: Filter 3 where it is absent, the earlier readings where there
-/// is no derivative gain, the sum where the converter is read once.
-Channel channelOf(const Loop& loop) {
-  using plant::kTransducerPeriod, plant::kUpdatePeriod;
-  constexpr Index kHeld = Mechanics::kSize, kFirst = kHeld + 1, kHistory = kFirst + 1,
-                  kSum = kHistory + 4, kSize = kSum + 1,
-                  kCommand = kSize;  // the command stands for itself at the end
-  const Mechanics m = mechanicsOf(loop);
-  const double update = static_cast<double>(kUpdatePeriod) * kSecondPerNanosecond;
-  const int updates = std::max(1, static_cast<int>(std::lround(loop.period / update)));
-  const double h = loop.period / updates;
-  const double between =
-      h * static_cast<double>(kTransducerPeriod) / static_cast<double>(kUpdatePeriod);
-  const MatrixXd same = MatrixXd::Identity(kSize + 1, kSize + 1);
-
-  MatrixXd generator = MatrixXd::Zero(kSize + 1, kSize + 1);
-  generator.topLeftCorner(Mechanics::kSize, Mechanics::kSize) = m.A;
-  generator.block(0, kHeld, Mechanics::kSize, 1) = m.B;
-
-  // Update: the pair's second reading is now.
-  MatrixXd X = MatrixXd::Zero(1, kSize + 1);
-  X(0, Mechanics::kLength) = 0.5;
-  X(0, kFirst) = 0.5;
-  MatrixXd next = same;
-  next.row(kHeld) = -(loop.velocity_gain + loop.derivative_gain) * X;
-  next(kHeld, kCommand) += loop.velocity_gain;
-  next(kHeld, kHistory + 3) += loop.derivative_gain;
-  next.row(kHistory) = X;
-  for (Index i = 1; i < 4; ++i) next.row(kHistory + i) = same.row(kHistory + i - 1);
-  // The pair's first reading, `between` before the update.
-  MatrixXd read = same;
-  read.row(kFirst) = same.row(Mechanics::kLength);
-  // The converter: a sensor that is late by a little shows what was a little ago.
-  RowVectorXd felt = RowVectorXd::Zero(kSize + 1);
-  felt(Mechanics::kSensor) = 1.0;
-  felt(Mechanics::kSensor + 1) = -loop.late;
-
-  // The controller's tick falls anywhere between two updates: in the middle, here.
-  std::vector<Event> events;
-  for (int k = 0; k < updates; ++k) {
-    events.push_back({(k + 0.5) * h - between, read});
-    events.push_back({(k + 0.5) * h, next});
-  }
-  if (loop.readings > 1) {
-    MatrixXd empty = same, add = same;
-    empty.row(kSum).setZero();
-    add.row(kSum) += felt / loop.readings;
-    events.insert(events.begin(), {0.0, empty});
-    for (int k = 0; k < loop.readings; ++k)
-      events.push_back({(k + 0.5) * loop.period / loop.readings, add});
-    felt = same.row(kSum);
-  }
-  const MatrixXd all = throughPeriod(loop.period, events, generator);
-  std::vector<Index> kept;
-  for (Index i = 0; i < kSize; ++i) {
-    const bool filter = i >= Mechanics::kFilter && i < Mechanics::kSensor,
-               history = i >= kHistory && i < kSum;
-    if ((!filter || loop.filter_cutoff > 0.0) && (!history || loop.derivative_gain > 0.0) &&
-        (i != kSum || loop.readings > 1))
-      kept.push_back(i);
-  }
-  return {all(kept, kept), all(kept, kCommand), felt(kept)};
-}
-
-/// The controller's servo model of one direction. z = {length, speed, v_end, sensor (2), where a
-/// delay is believed the command before, where the readings are averaged the filtered speed of the
-/// tick before}; a reading replaces the length at every tick.
-Channel observerOf(const Loop& loop) {
-  constexpr Index kLength = 0, kSpeed = 1, kHeld = 2, kSensor = 3, kBefore = 5, kMean = 6,
-                  kSize = 7, kCommand = kSize;
-  const ServoModel& servo = loop.model.servo;
-  const double w = servo.sensor_cutoff, tau = servo.tau(0), K = servo.extend(0);
-  const int updates = std::max(1, static_cast<int>(std::lround(loop.period / servo.update)));
-  const double h = loop.period / updates;
-  const MatrixXd same = MatrixXd::Identity(kSize + 1, kSize + 1);
-
-  MatrixXd generator = MatrixXd::Zero(kSize + 1, kSize + 1);
-  generator(kLength, kSpeed) = 1.0;
-  generator(kSpeed, kSpeed) = -1.0 / tau;
-  generator(kSpeed, kHeld) = 1.0 / tau;
-  generator(kSensor, kSensor + 1) = 1.0;
-  generator(kSensor + 1, kSensor) = -w * w;
-  generator(kSensor + 1, kSensor + 1) = -M_SQRT2 * w;
-  generator.row(kSensor + 1) += w * w * generator.row(kSpeed);
-  MatrixXd next = same, early = same;
-  next.row(kHeld).setZero();
-  next(kHeld, kLength) = -K;
-  next(kHeld, kSpeed) = K * (servo.reading_age - servo.derivative);
-  early.row(kHeld) = next.row(kHeld);
-  next(kHeld, kCommand) = K;
-  early(kHeld, kBefore) = K;
-
-  // The acceleration behind the filter, or the filtered speed, sensor_delay ago.
-  RowVectorXd felt = RowVectorXd::Zero(kSize + 1), speed = felt;
-  felt(kSensor) = 1.0;
-  felt(kSensor + 1) = -servo.sensor_delay;
-  speed(kSpeed) = 1.0;
-  speed(kSensor) = -M_SQRT2 / w - servo.sensor_delay;
-  speed(kSensor + 1) = -1.0 / (w * w);
-  std::vector<Event> events;
-  const bool averages = servo.sensor_window > 0.0;
-  if (averages) {
-    MatrixXd keep = same;
-    keep.row(kMean) = speed;
-    events.push_back({0.0, keep});
-    felt = (speed - same.row(kMean)) / servo.sensor_window;
-  }
-  bool waits = false;
-  for (int k = 0; k < updates; ++k) {
-    const double time = (k + 0.5) * h;
-    const bool arrived = time >= servo.delay(0);
-    waits = waits || !arrived;
-    events.push_back({time, arrived ? next : early});
-  }
-  MatrixXd kept_command = same;
-  kept_command.row(kBefore) = same.row(kCommand);
-  events.push_back({loop.period, kept_command});
-  const MatrixXd all = throughPeriod(loop.period, events, generator);
-  std::vector<Index> kept;
-  for (Index i = 0; i < kSize; ++i)
-    if ((i != kBefore || waits) && (i != kMean || averages)) kept.push_back(i);
-  return {all(kept, kept), all(kept, kCommand), felt(kept)};
+/// Orthogonal, the first column along d.
+Mat6 axesAlong(const Vec6& d) {
+  Vec6 v = d.normalized();  // Householder's reflection that takes it to the first axis
+  Mat6 H = Mat6::Identity();
+  v(0) += v(0) < 0.0 ? -1.0 : 1.0;
+  H -= 2.0 / v.squaredNorm() * v * v.transpose();
+  if (H.col(0).dot(d) < 0.0) H = -H;
+  return H;
 }
 
 /// What of a loop does not depend on the robot.
 struct Lifted {
   Channel channel;
-  Channel model;  // where the inertia is taken out
+  Channel leaning;               // where there is a contact
+  Channel model;                 // where the inertia is taken out
+  Mat6 axes = Mat6::Identity();  // of the channels, which are equal; the first along the contact
 };
 
 Lifted liftedOf(const Loop& loop) {
-  Lifted out{channelOf(loop), {}};
+  Lifted out{channelOf(loop, {}), {}, {}};
   if (loop.model.inertia) out.model = observerOf(loop);
+  if (loop.contact) {
+    out.leaning = channelOf(loop, loop.contact);
+    out.axes = axesAlong(loop.contact->direction);
+  }
   return out;
 }
 
 /// The whole loop over a period, of {eta, eta', six channels, six servo models where the inertia is
 /// taken out, six late wrenches a tick of delay}. With the inertia taken out the modes are those of
-/// the base with the robot on it.
-MatrixXd systemOf(const Loop& loop, const Lifted& lifted) {
+/// the base with the robot on it. `pushed` adds a column, last, of a reading of a force along it.
+MatrixXd systemOf(const Loop& loop, const Lifted& lifted, const Vec6* pushed = nullptr,
+                  RowVectorXd* first_command = nullptr) {
   const Loop::Model& own = loop.model;
-  const Channel &channel = lifted.channel, &model = lifted.model;
+  const Channel& model = lifted.model;
+  const auto channel = [&](Index i) -> const Channel& {
+    return i == 0 && loop.contact ? lifted.leaning : lifted.channel;
+  };
   const ModalModel base = own.inertia ? withBody(loop.base, own.M_1()) : loop.base;
-  const Index n = channel.step.rows(), m = model.step.rows(), k = base.stiffness.size(),
+  const Index n = lifted.channel.step.rows(), m = model.step.rows(), k = base.stiffness.size(),
               d = loop.delay;
   const MatrixXd& Phi = base.Phi;
   const double T = loop.period;
-  const Index channels = 2 * k, models = channels + 6 * n, late = models + 6 * m,
-              size = late + 6 * d;
+  const Index channels = 2 * k, models = channels + channel(0).step.rows() + 5 * n,
+              late = models + 6 * m, reading = late + 6 * d, size = reading + (pushed ? 1 : 0);
+  const auto startOf = [&](Index i) { return i == 0 ? channels : models - (6 - i) * n; };
   MatrixXd S = MatrixXd::Zero(size, size);
 
   // The wrench of this tick: what the accelerations make of it, and the controller's own model.
   MatrixXd sampled = MatrixXd::Zero(6, size), modelled = MatrixXd::Zero(6, size);
   for (Index i = 0; i < 6; ++i) {
-    sampled.block(i, channels + i * n, 1, n) = channel.felt;
+    sampled.block(i, startOf(i), 1, channel(i).felt.size()) = channel(i).felt;
     if (own.inertia) modelled.block(i, models + i * m, 1, m) = model.felt;
   }
-  MatrixXd F = -spatialMass(loop.robot_P) * sampled;
-  if (own.inertia) F += own.M_1() * modelled;
+  MatrixXd F = -spatialMass(loop.robot_P) * lifted.axes * sampled;
+  if (own.inertia) F += own.M_1() * lifted.axes * modelled;
+  if (pushed) F.col(reading) = *pushed;
+  if (loop.contact && !pushed)
+    F.middleCols(channels, channel(0).pressed.size()) +=
+        loop.contact->direction * channel(0).pressed;
   if (d > 0) {
     S.middleRows(late, 6) = F;
     for (Index i = 1; i < d; ++i) S.block(late + 6 * i, late + 6 * (i - 1), 6, 6).setIdentity();
     F.setZero();
-    F.rightCols(6).setIdentity();
+    F.middleCols(reading - 6, 6).setIdentity();
   }
 
   // Admittance model.
@@ -300,15 +114,17 @@ MatrixXd systemOf(const Loop& loop, const Lifted& lifted) {
     command += feedForward(own.servo, rate, T, T, 1.0)(0) * x_dot +
                feedForward(own.servo, acceleration, T, T, 1.0)(0) * x_ddot;
   }
+  command = lifted.axes.transpose() * command;
+  if (first_command) *first_command = command.row(0);
   for (Index i = 0; i < 6; ++i) {
-    const Index at = channels + i * n;
-    S.middleRows(at, n) = channel.from_command * command.row(i);
-    S.block(at, at, n, n) += channel.step;
+    const Index at = startOf(i), rows = channel(i).step.rows();
+    S.middleRows(at, rows) = channel(i).from_command * command.row(i);
+    S.block(at, at, rows, rows) += channel(i).step;
     if (!own.inertia) continue;
     const Index own_at = models + i * m;
     S.middleRows(own_at, m) = model.from_command * command.row(i);
     S.block(own_at, own_at + 1, m, m - 1) += model.step.rightCols(m - 1);
-    S.col(at + Mechanics::kLength).segment(own_at, m) += model.step.col(0);  // as read
+    S.col(at + ChannelState::kLength).segment(own_at, m) += model.step.col(0);  // as read
   }
   return S;
 }
@@ -382,6 +198,39 @@ bool decaysWithAll(const Loop& loop, const std::vector<CarriedRobot>& robots) {
   return std::all_of(robots.begin(), robots.end(), [&](const CarriedRobot& robot) {
     return decays(carrying(loop, robot), lifted);
   });
+}
+
+Eigen::VectorXcd roots(const Loop& loop) { return eigenvalues(systemOf(loop, liftedOf(loop))); }
+
+PushedLoop pushedLoop(const Loop& loop) {
+  const Vec6 direction = loop.contact->direction;
+  Loop free = loop;
+  free.contact.reset();
+  Lifted lifted = liftedOf(free);
+  lifted.axes = axesAlong(direction);
+  MatrixXd places(PushedLoop::kSubsteps + 1, 0);
+  channelOf(free, {}, &places);
+  RowVectorXd command;
+  PushedLoop out;
+  out.step = systemOf(free, lifted, &direction, &command);
+  const Index k = loop.base.stiffness.size(), n = lifted.channel.step.rows(),
+              size = out.step.rows() - 1;
+  out.step.conservativeResize(size, size + 1);
+  out.places = places.rightCols(1) * command;
+  out.places.middleCols(2 * k, n) += places.leftCols(n);
+  out.places *= direction.norm();
+  const bool inside = loop.model.inertia;  // the base's modes carry the robot
+  const ModalModel base = inside ? withBody(loop.base, loop.model.M_1()) : loop.base;
+  out.energy = MatrixXd::Zero(size, size);
+  out.energy.diagonal().head(k) = 0.5 * base.stiffness;
+  out.energy.diagonal().segment(k, k).setConstant(0.5);
+  if (inside) return out;
+  const Mat6 M = lifted.axes.transpose() * spatialMass(loop.robot_P) * lifted.axes;
+  for (Index i = 0; i < 6; ++i)
+    for (Index j = 0; j < 6; ++j)
+      out.energy(2 * k + i * n + ChannelState::kSpeed, 2 * k + j * n + ChannelState::kSpeed) +=
+          0.5 * M(i, j);
+  return out;
 }
 
 double radius(const Loop& loop) { return std::abs(largestRoot(systemOf(loop, liftedOf(loop)))); }

@@ -46,6 +46,18 @@ Compensation readCompensation(Section& controller) {
   return c;
 }
 
+/// Off without the key.
+Passivity readPassivity(Section& controller) {
+  Passivity p;
+  if (!controller.has("passivity")) return p;
+  Section s = controller.section("passivity");
+  p.enabled = s.flag("enabled");
+  p.reserve = s.number("reserve_j", 0.0, 1e6);
+  p.damping = s.number("damping_per_s", 0.0, 20.0);  // explicit: stable to 2 a period
+  s.finish();
+  return p;
+}
+
 }  // namespace
 
 void readController(Section s, ControllerConfig& c) {
@@ -63,6 +75,7 @@ void readController(Section s, ControllerConfig& c) {
   c.stability_uncompensated = readStability(s, "stability_uncompensated");
   c.tare_ramp = s.number("tare_ramp_s", 0.01, 100.0);
   c.compensation = readCompensation(s);
+  c.passivity = readPassivity(s);
   Section still = s.section("still");
   c.stillness.leg_counts = static_cast<int>(still.integer("leg_counts", 0, 1000));
   c.stillness.joint = still.number("joint_rad_or_m", 0.0, 1.0);

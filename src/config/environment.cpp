@@ -50,6 +50,17 @@ ContactLaw readLaw(Section s) {
   return law;
 }
 
+Grip readGrip(Section s) {
+  Grip grip;
+  grip.stiffness = s.number("stiffness_n_per_m", kTiny, 1e9);
+  grip.damping = s.number("damping_n_s_per_m", 0.0, 1e9);
+  grip.turn_stiffness = s.number("turn_stiffness_nm_per_rad", kTiny, 1e9);
+  grip.turn_damping = s.number("turn_damping_nm_s_per_rad", 0.0, 1e9);
+  grip.reach = s.number("reach_m", 0.0, 1.0);
+  s.finish();
+  return grip;
+}
+
 Target readTarget(Section s, const Vec3& tool_I) {
   Target target;
   target.mass = s.number("mass_kg", kTiny, 1e6);
@@ -102,14 +113,17 @@ World readEnvironment(Section s, const Experiment& e) {
       environment.bodies.push_back(body);
     }
   if (s.has("target")) environment.target = readTarget(s.section("target"), tool_I);
+  if (s.has("grip")) environment.grip = readGrip(s.section("grip"));
   if (environment.bodies.empty() && !environment.target)
     s.fail("bodies", "and target are both missing: there is nothing to touch");
   s.finish();
+  JointState joints;
+  joints.q = e.plant.initial_joints;
+  BodyMotion P;  // at rest
+  P.X = e.plant.geometry.fromHome(e.plant.initial_pose);
   const Touch start =
       touch(environment,
-            carriedFrame(payload.robot, {e.plant.initial_joints, {}, {}},
-                         {e.plant.geometry.fromHome(e.plant.initial_pose), {}, {}, {}, {}},
-                         payload.X_PL0(), world.link, world.X_link),
+            carriedFrame(payload.robot, joints, P, payload.X_PL0(), world.link, world.X_link),
             environment.target ? environment.target->start : Floating{});
   if (start.least < 0.0)
     s.fail("tool",

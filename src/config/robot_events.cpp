@@ -189,6 +189,14 @@ void RobotEvents::readGrasp(Section& s, const Cue& cue) {
   if (holds_) s.fail("grasp", "the robot has something in hand, want a release before");
   holds_ = true;
   Section grasp = s.section("grasp");
+  if (grasp.has("target") && grasp.flag("target")) {
+    const std::optional<World>& world = out_.plant.world;
+    if (!world || !world->environment.target || !world->environment.grip)
+      grasp.fail("target", "there is none, or no grip, in this scenario's environment");
+    grasp.finish();
+    moved(cue, GraspTarget{}, sinceStart(cue));
+    return;
+  }
   const std::optional<double> delay = readDelay(grasp);
   const RigidBody body = combine(RigidBody{}, frame.X_link, readBody(grasp));
   moved(cue, Grasp{frame.link, body}, sinceStart(cue));

@@ -5,35 +5,57 @@
 #include <array>
 #include <cmath>
 
+#include "ves/contact/contact_watch.hpp"
+
 namespace ves {
 namespace {
 
-/// One feeler on one body: adds what it does to the tool; returns the force, and where it acts.
+/// One feeler on one body: adds what it does to the tool; returns force, place and gap.
 struct Push {
   Vec3 force_I = Vec3::Zero();  // [N] on the tool
   Vec3 p_I = Vec3::Zero();      // [m] where
+  double gap = 0.0;             // [m]
 };
 Push push(const ContactLaw& law, const Feeler& feeler, const FrameMotion& tool, const Shape& shape,
           const Transform& X_IB, const Vec3& v_IB_I, const Vec3& w_IB_I, Touch& out) {
   const Vec3 centre = tool.X * feeler.p_TQ_T;
   const Proximity near = proximity(shape, inverse(X_IB) * centre);
-  const double gap = near.distance - feeler.radius;
-  out.least = std::min(out.least, gap);
-  Push done;
-  if (!(gap < 0.0)) return done;
   const Vec3 n = X_IB.R * near.normal;
+  Push done;
+  done.gap = near.distance - feeler.radius;
   done.p_I = centre - feeler.radius * n;
   const Vec3 v =
       tool.v + tool.w.cross(done.p_I - tool.X.p) - (v_IB_I + w_IB_I.cross(done.p_I - X_IB.p));
-  done.force_I = contactForce(law, -gap, n, v);
-  out.stored += storedEnergy(law, -gap);
+  if (done.gap < out.least) {
+    out.least = done.gap;
+    out.closing = -n.dot(v);
+  }
+  if (!(done.gap < 0.0)) return done;
+  done.force_I = contactForce(law, -done.gap, n, v);
+  out.stored += storedEnergy(law, -done.gap);
+  out.pressed += done.force_I;
   out.on_tool_To_I.f += done.force_I;
   out.on_tool_To_I.n += (done.p_I - tool.X.p).cross(done.force_I);
   return done;
 }
 
+/// What holds the target where the tool has taken it.
+void hold(const Grip& grip, const FrameMotion& tool, const Floating& target, Touch& out) {
+  const Transform X_IB = tool.X * *target.X_TB;  // where it should be
+  const Vec3 off = target.p - X_IB.p, lever = target.p - tool.X.p;
+  const Eigen::AngleAxisd turned(target.X_IB().R * X_IB.R.transpose());
+  const Vec3 angle = turned.angle() * turned.axis();
+  const Vec3 v = target.v - (tool.v + tool.w.cross(lever)), w = target.w - tool.w;
+  const Wrench on_target{-grip.stiffness * off - grip.damping * v,
+                         -grip.turn_stiffness * angle - grip.turn_damping * w};
+  out.on_target_Bo_I = out.on_target_Bo_I + on_target;
+  out.on_tool_To_I = out.on_tool_To_I - shift(on_target, -lever);
+  out.stored +=
+      0.5 * (grip.stiffness * off.squaredNorm() + grip.turn_stiffness * angle.squaredNorm());
+}
+
 Floating moved(const Floating& from, const FloatingRates& by, double dt) {
-  Floating out;
+  Floating out = from;
   out.p = from.p + dt * by.p;
   out.v = from.v + dt * by.v;
   out.w = from.w + dt * by.w;
@@ -56,6 +78,8 @@ FrameMotion between(const FrameMotion& a, const FrameMotion& b, double dt, doubl
   return out;
 }
 
+constexpr double kMostAlone = 2e-3;  // [s]
+
 }  // namespace
 
 Touch touch(const Environment& environment, const FrameMotion& tool,
@@ -64,13 +88,23 @@ Touch touch(const Environment& environment, const FrameMotion& tool,
   for (const Feeler& feeler : environment.tool) {
     for (const FixedBody& body : environment.bodies)
       push(environment.law, feeler, tool, body.shape, body.X_IB, Vec3::Zero(), Vec3::Zero(), out);
-    if (!environment.target) continue;
+    if (!environment.target || target.X_TB) continue;
     const Push on = push(environment.law, feeler, tool, environment.target->shape, target.X_IB(),
                          target.v, target.w, out);
+    out.from_target = std::min(out.from_target, on.gap);
     out.on_target_Bo_I.f -= on.force_I;
     out.on_target_Bo_I.n -= (on.p_I - target.p).cross(on.force_I);
   }
+  if (target.X_TB) hold(*environment.grip, tool, target, out);
   return out;
+}
+
+bool grasp(const Environment& environment, const FrameMotion& tool, Floating& target) noexcept {
+  if (!environment.target || !environment.grip || target.X_TB ||
+      !(touch(environment, tool, target).from_target <= environment.grip->reach))
+    return false;
+  target.X_TB = inverse(tool.X) * target.X_IB();
+  return true;
 }
 
 FloatingRates rates(const Environment& environment, const Floating& target,
@@ -89,23 +123,28 @@ FloatingRates rates(const Environment& environment, const Floating& target,
 }
 
 Touch advance(const Environment& environment, const FrameMotion& from, const FrameMotion& to,
-              double dt, double step, Floating& target) noexcept {
+              double t, double dt, double step, Floating& target, ContactWatch& watch) noexcept {
   Touch mean;
   if (!(dt > 0.0)) return mean;
-  const int steps = std::max(1, static_cast<int>(std::ceil(dt / step - 1e-9)));
+  // Far from everything one step does: at less than 5 m/s nothing comes so near in it.
+  constexpr double kFar = 0.01;  // [m]
+  const bool alone =
+      !target.X_TB && dt <= kMostAlone && touch(environment, from, target).least > kFar;
+  const int steps = alone ? 1 : std::max(1, static_cast<int>(std::ceil(dt / step - 1e-9)));
   const double h = dt / steps;
   for (int k = 0; k < steps; ++k) {
     const auto tool = [&](double later) { return between(from, to, dt, (k + later) / steps); };
     const FrameMotion begin = tool(0.0), middle = tool(0.5), end = tool(1.0);
-    const auto at = [&](const FrameMotion& t, const Floating& body, Touch& touched) {
-      touched = touch(environment, t, body);
+    const auto at = [&](const FrameMotion& there, const Floating& body, Touch& touched) {
+      touched = touch(environment, there, body);
       return rates(environment, body, touched.on_target_Bo_I);
     };
-    std::array<Touch, 4> t;
-    const FloatingRates a = at(begin, target, t[0]);
-    const FloatingRates b = at(middle, moved(target, a, 0.5 * h), t[1]);
-    const FloatingRates c = at(middle, moved(target, b, 0.5 * h), t[2]);
-    const FloatingRates d = at(end, moved(target, c, h), t[3]);
+    std::array<Touch, 4> stage;
+    const FloatingRates a = at(begin, target, stage[0]);
+    watch.see(t + k * h, stage[0]);
+    const FloatingRates b = at(middle, moved(target, a, 0.5 * h), stage[1]);
+    const FloatingRates c = at(middle, moved(target, b, 0.5 * h), stage[2]);
+    const FloatingRates d = at(end, moved(target, c, h), stage[3]);
     const FloatingRates sum = {a.p + 2.0 * b.p + 2.0 * c.p + d.p, a.v + 2.0 * b.v + 2.0 * c.v + d.v,
                                a.w + 2.0 * b.w + 2.0 * c.w + d.w,
                                a.q + 2.0 * b.q + 2.0 * c.q + d.q};
@@ -117,10 +156,12 @@ Touch advance(const Environment& environment, const FrameMotion& from, const Fra
         sum_of.f += share * one.f;
         sum_of.n += share * one.n;
       };
-      add(mean.on_tool_To_I, t[i].on_tool_To_I);
-      add(mean.on_target_Bo_I, t[i].on_target_Bo_I);
-      mean.least = std::min(mean.least, t[i].least);
-      mean.stored += share * t[i].stored;
+      add(mean.on_tool_To_I, stage[i].on_tool_To_I);
+      add(mean.on_target_Bo_I, stage[i].on_target_Bo_I);
+      mean.pressed += share * stage[i].pressed;
+      mean.least = std::min(mean.least, stage[i].least);
+      mean.from_target = std::min(mean.from_target, stage[i].from_target);
+      mean.stored += share * stage[i].stored;
     }
   }
   return mean;

@@ -11,6 +11,7 @@ AdmittanceControl::AdmittanceControl(const ControllerConfig& config)
     : model_(config.admittance, config.periodSeconds()),
       inertia_(config.compensation.inertia),
       wrench_delay_(wrenchDelay(config.servo, config.periodSeconds())),
+      energy_(config),
       period_(config.periodSeconds()),
       joint_moves_(config.stillness.joint),
       growth_floor_(config.safety.growth_floor),
@@ -20,6 +21,7 @@ void AdmittanceControl::begin(const Vec6& x, const Mat6& M_1, double age) noexce
   model_.reset(x, M_1, inertia_ ? age + wrench_delay_ : 0.0);
   begins_ = true;
   oscillation_.reset();
+  energy_.reset();
 }
 
 const PathPoint<6>& AdmittanceControl::step(const AdmittanceInput& in, const Vec6& last,
@@ -28,10 +30,13 @@ const PathPoint<6>& AdmittanceControl::step(const AdmittanceInput& in, const Vec
     const double since = begins_ ? std::min(in.wrench.since, period_) : in.wrench.since;
     begins_ = false;
     if (inertia_)
-      model_.step(in.F_Po_I, in.M_1, since, in.wrench.age + in.share * wrench_delay_);
+      model_.step(in.F_Po_I, in.M_1, since, in.wrench.age + in.share * wrench_delay_,
+                  energy_.damping());
     else
-      model_.step(in.F_Po_I);
+      model_.step(in.F_Po_I, energy_.damping());
     slowInsideEnvelope(last, in.L, checks);
+    energy_.take(in.F_Po_I, in.measured.stacked(), model_.taken(in.F_Po_I), model_.damped(),
+                 model_.kineticEnergy());
     const bool held = scale_ < 1.0 && model_.kineticEnergy() > growth_floor_;
     oscillation_.take(model_.energy(), held, in.q, joint_moves_, period_, growth_floor_);
   }

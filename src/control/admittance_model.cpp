@@ -178,6 +178,7 @@ AdmittanceModel::AdmittanceModel(const ModalModel& model, double period)
       step_(dynamics_.hold(period)) {
   now_.modes = dynamics_.atRest();
   before_ = now_;
+  damping_.setZero(dynamics_.size());
 }
 
 void AdmittanceModel::reset(const Vec6& x, const Mat6& M_1, double ahead) noexcept {
@@ -196,20 +197,26 @@ void AdmittanceModel::reset(const Vec6& x, const Mat6& M_1, double ahead) noexce
   modes = light.advance(light.body(M_1), -ahead, modes, none);
 }
 
-void AdmittanceModel::step(const Wrench& F_Po_I) noexcept {
+void AdmittanceModel::step(const Wrench& F_Po_I, double damping) noexcept {
   before_ = now_;
   ModalDynamics::Forces u;  // Phi^T F
   u.noalias() = dynamics_.Phi().transpose() * F_Po_I.stacked();
+  damping_ = -damping * before_.modes.eta_dot;
+  u += damping_;
   now_.modes = dynamics_.advance(step_, before_.modes, u);
   now_.motion = at(now_.modes, dynamics_.acceleration(now_.modes, u));
 }
 
-void AdmittanceModel::step(const Wrench& F_Po_I, const Mat6& M_1, double dt,
-                           double ahead) noexcept {
+void AdmittanceModel::step(const Wrench& F_Po_I, const Mat6& M_1, double dt, double ahead,
+                           double damping) noexcept {
   const ModalDynamics::Body body = dynamics_.body(M_1);
   before_ = now_;
   ModalDynamics::Forces u;
   u.noalias() = dynamics_.Phi().transpose() * F_Po_I.stacked();
+  const Vec6 momentum = M_1 * (dynamics_.Phi() * before_.modes.eta_dot);
+  damping_ = -damping * before_.modes.eta_dot;
+  damping_.noalias() -= damping * dynamics_.Phi().transpose() * momentum;
+  u += damping_;
   now_.modes = dynamics_.advance(body, dt, before_.modes, u);
   const Modes later = dynamics_.advance(body, ahead, now_.modes, u);
   now_.motion = at(later, dynamics_.acceleration(body, later, u));

@@ -92,9 +92,9 @@ PathPoint<6> TestPlatform::nextMotion(const Wrench& dynamic) noexcept {
   if (supervisor_.runs(motion_, SegmentKind::kCalibration))
     bias_.calibrate(sample, samples_.fresh(), load_.counts());
   if (supervisor_.runs(motion_, SegmentKind::kAdmittance))
-    return motion_.admittanceModel(
-        {dynamic, robot_.M_1(), share_.value(), samples_.wrench(), sample.q, commander_.legs().L},
-        safety_.path());
+    return motion_.admittanceModel({dynamic, robot_.M_1(), share_.value(), samples_.wrench(),
+                                    sample.q, commander_.legs().L, legs_.measured().pose},
+                                   safety_.path());
   if (supervisor_.moves()) return motion_.trajectoryGeneration();
   // Until the legs follow, they are where they are measured.
   const bool at_measured = supervisor_.disarmed() ||
@@ -156,6 +156,10 @@ const TickState& TestPlatform::report(const Wrenches& W) noexcept {
   state_.motion = motion_.motion();
   state_.desired = motion_.desired();
   state_.envelope_scale = motion_.admittance().scale();
+  const EnergyAccount& energy = motion_.admittance().energy();
+  state_.energy_put_in = energy.putIn();
+  state_.energy_paid = energy.paid();
+  state_.passivity_damping = energy.damping();
   state_.legs = commander_.legs();
   state_.reference = commander_.reference();
   state_.command = commander_.command();

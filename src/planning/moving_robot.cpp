@@ -28,7 +28,7 @@ bool MovingRobot::begin(const RobotAction& action, std::int64_t now) noexcept {
     robot_ = withLoad(robot_, carrier_, grasp->body);
     return true;
   }
-  if (!held_) return false;
+  if (!held_ || !std::holds_alternative<Release>(action)) return false;
   held_ = false;
   robot_.bodyOf(carrier_) = empty_hand_;
   return true;

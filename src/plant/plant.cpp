@@ -102,6 +102,18 @@ void Plant::startRobotEvents() noexcept {
   planRobotEvent();
 }
 
+bool Plant::moveRobot(const RobotAction& action) noexcept {
+  if (std::holds_alternative<GraspTarget>(action))
+    return config_.world && !robot_.holds() &&
+           grasp(config_.world->environment, toolMotion(), truth_.target);
+  if (std::holds_alternative<Release>(action) && truth_.target.X_TB) {
+    truth_.target.X_TB.reset();
+    return true;
+  }
+  standing_.reset();
+  return robot_.begin(action, now_);
+}
+
 double Climate::at(double t) const noexcept {
   return mean + 0.5 * swing * std::sin(2.0 * M_PI * (t - rising) / period);
 }
@@ -227,7 +239,8 @@ Wrench Plant::meetWorld(double dt) noexcept {
   const bool held = world.release >= 0 && began_[static_cast<std::size_t>(world.release)] == kNever;
   Floating target = truth_.target;
   if (held) target.v = target.w = Vec3::Zero();
-  const Touch mean = ves::advance(world.environment, tool_, now, dt, kContactStep, target);
+  const Touch mean = ves::advance(world.environment, tool_, now, seconds(last_step_) - dt, dt,
+                                  kContactStep, target, truth_.contacts);
   if (!held) truth_.target = target;
   tool_ = now;
   truth_.contact_To_I = mean.on_tool_To_I;

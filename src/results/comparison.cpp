@@ -136,6 +136,11 @@ Motion motion(const std::vector<InteractionPoint>& points) {
     out.t.push_back(p.t);
     out.x.push_back(p.x);
     out.x_dot.push_back(p.x_dot);
+    out.on_tool.push_back(p.touch.on_tool_To_I.f.norm());
+    const auto begun = static_cast<std::size_t>(p.contacts.count());
+    if (begun == 0) continue;
+    out.contacts.resize(begun);  // of those that began between two points the last is known
+    out.contacts.back() = p.contacts.last();
   }
   return out;
 }

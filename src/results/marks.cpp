@@ -19,6 +19,7 @@ struct NameOf {
   }
   std::string operator()(const ToolMove&) const { return "tool"; }
   std::string operator()(const Grasp&) const { return "grasp"; }
+  std::string operator()(const GraspTarget&) const { return "grasp"; }
   std::string operator()(const Release&) const { return "release"; }
 };
 

@@ -154,6 +154,7 @@ std::vector<std::filesystem::path> draw(const std::string& script,
 }  // namespace
 
 std::vector<std::filesystem::path> drawPlots(const Series& series,
+                                             const std::optional<Emulation>& emulation,
                                              const std::optional<ToolMotion>& tool,
                                              const std::filesystem::path& folder) {
   if (series.rows.empty()) return {};
@@ -289,6 +290,39 @@ std::vector<std::filesystem::path> drawPlots(const Series& series,
     page.panel("carried off by [mm]", motions);
     page.panel("actual minus on the base [mm]", errors);
     finish("tool.png", page);
+  }
+
+  if (experiment.plant.world) {
+    Page page(series, marks, "contact.png",
+              experiment.name + ": what the tool touches, and the energy that the emulation put in",
+              program, 1, 2);
+    std::vector<Curve> force = {
+        {[](const Row& r) { return r.has_truth ? Vec3::Map(r.truth.contact).norm() : NAN; },
+         "on the tool", kColour[0], false}};
+    if (emulation) {
+      std::map<std::int64_t, double> due;  // [N] by tick
+      std::optional<std::int64_t> first;
+      eachTick(series, [&](const Row& row, double) {
+        const std::int64_t tick = row.state.header.sequence;
+        if (!first) first = tick;
+        const auto at = static_cast<std::size_t>(tick - *first);
+        if (at < emulation->base.on_tool.size()) due[tick] = emulation->base.on_tool[at];
+      });
+      force.push_back({[due](const Row& row) {
+                         const auto at = due.find(row.state.header.sequence);
+                         return at == due.end() ? NAN : at->second;
+                       },
+                       "on the base in free space", kColour[1], true});
+    }
+    page.panel("force [N]", force);
+    constexpr double kShownEnergy = 1e3;  // [mJ/J]
+    std::vector<Curve> energy = {{[](const Row& r) { return kShownEnergy * r.state.energy_put_in; },
+                                  "put in", kColour[0], false}};
+    if (experiment.controller.passivity.enabled)
+      energy.push_back({[](const Row& r) { return kShownEnergy * r.state.energy_paid; },
+                        "damped away", kColour[2], false});
+    page.panel("energy [mJ]", energy);
+    finish("contact.png", page);
   }
 
   return draw(script, files, folder);

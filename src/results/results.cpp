@@ -10,6 +10,7 @@
 #include <cstring>
 
 #include "ves/realtime/realtime.hpp"
+#include "ves/results/contacts.hpp"
 #include "ves/results/plots.hpp"
 #include "ves/results/summary.hpp"
 #include "ves/results/tool_motion.hpp"
@@ -48,7 +49,8 @@ std::filesystem::path claimNewFolder(const std::filesystem::path& folder) {
 std::string writeResults(const std::filesystem::path& folder, const RunResult& result, bool plots) {
   const Series series = readSeries((folder / "run.lcmlog").string());
   ReferenceMotions references;
-  const std::optional<ToolMotion> tool = toolMotion(series, emulation(series, references));
+  const std::optional<Emulation> e = emulation(series, references);
+  const std::optional<ToolMotion> tool = toolMotion(series, e);
   writeCsv(series, tool ? columnsOf(*tool) : std::vector<Column>(),
            (folder / "series.csv").string());
   const auto summary = summarise(series, result, references);
@@ -56,8 +58,12 @@ std::string writeResults(const std::filesystem::path& folder, const RunResult& r
   std::string out = table(summary) + "\n";
   for (const std::string& line : series.damage.lines()) out += fmt::format("  {}\n", line);
   std::string files = "run.lcmlog, series.csv, summary.json";
+  if (series.experiment.plant.world) {
+    writeContacts(contactPairs(series, e), (folder / "contacts.csv").string());
+    files += ", contacts.csv";
+  }
   if (plots)
-    for (const std::filesystem::path& plot : drawPlots(series, tool, folder))
+    for (const std::filesystem::path& plot : drawPlots(series, e, tool, folder))
       files += ", " + plot.filename().string();
   const std::filesystem::path here = folder.lexically_relative(std::filesystem::current_path());
   const bool below = !here.empty() && *here.begin() != "..";

@@ -224,6 +224,23 @@ std::vector<Column> columns(const Experiment& experiment) {
             return coordinateOf(toolPose(*whole, Vec6::Map(r.truth.x), q), i);
           });
   }
+  if (experiment.plant.world) {
+    const auto truth = [&](const std::string& name, auto value) {
+      add(name, [value](const Row& r) { return r.has_truth ? value(r.truth) : NAN; });
+    };
+    truth("clearance_m", [](const truth_t& m) { return m.clearance; });
+    for (int i = 0; i < 6; ++i)
+      truth(fmt::format("{}_contact_{}", wrenchComponent(i).name, wrenchComponent(i).unit),
+            [i](const truth_t& m) { return m.contact[i]; });
+    truth("contacts", [](const truth_t& m) { return static_cast<double>(m.contacts); });
+    if (experiment.plant.world->environment.target)
+      for (int i = 0; i < 3; ++i) {
+        truth(fmt::format("{}_target_m", coordinate(i).name),
+              [i](const truth_t& m) { return m.target_p[i]; });
+        truth(fmt::format("{}_target_rate_m_per_s", coordinate(i).name),
+              [i](const truth_t& m) { return m.target_v[i]; });
+      }
+  }
   addChannels("bias", &state_t::bias);
   addChannels("deviation", &state_t::deviation);
   addChannels("standard_error", &state_t::standard_error);

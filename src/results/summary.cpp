@@ -10,8 +10,10 @@
 
 #include "ves/base/coordinates.hpp"
 #include "ves/realtime/latency.hpp"
+#include "ves/results/contacts.hpp"
 #include "ves/results/drift_samples.hpp"
 #include "ves/results/evidence.hpp"
+#include "ves/results/indicators.hpp"
 #include "ves/results/tool_motion.hpp"
 
 namespace ves {
@@ -73,6 +75,56 @@ void addTracking(const Series& series, nlohmann::ordered_json& out) {
     out[fmt::format("{}_error_rms_{}", name, unit)] = t.rms();
     if (t.sum_v2 > 0.0) out[name + "_lag_s"] = t.lag();
   }
+}
+
+/// Of the coordinate that moves most, an angle counted at the joints' radius.
+void addIndicators(const Series& series, nlohmann::ordered_json& out) {
+  const double radius = jointRadius(series.experiment.controller.geometry);
+  std::vector<double> due[6], actual[6];
+  for (const Row& row : series.rows)
+    if (measured(row))
+      for (int i = 0; i < 6; ++i) {
+        due[i].push_back(row.state.x_desired[i]);
+        actual[i].push_back(row.truth.x[i]);
+      }
+  int most = 0;
+  double widest = 0.0;
+  for (int i = 0; i < 6; ++i) {
+    if (due[i].empty()) return;
+    const auto [low, high] = std::minmax_element(due[i].begin(), due[i].end());
+    const double range = (*high - *low) * (i < 3 ? 1.0 : radius);
+    if (!(range > widest)) continue;
+    widest = range;
+    most = i;
+  }
+  if (!(widest > kMoved)) return;
+  const TrackingIndicators t =
+      trackingIndicators(due[most], actual[most], series.experiment.controller.periodSeconds());
+  out["tracking_coordinate"] = coordinate(most).name;
+  out["tracking_delay_s"] = t.delay;
+  out["tracking_rms"] = t.rms;
+  out["tracking_paei_amplitude"] = t.paei_amplitude;
+  out["tracking_paei_phase_rad"] = t.paei_phase;
+  out["tracking_fdb_amplitude"] = t.fdb_amplitude;
+  out["tracking_fdb_phase_rad"] = t.fdb_phase;
+  out["tracking_fdb_delay_s"] = t.fdb_delay;
+}
+
+/// The energy account of admittance control (control/energy_account.hpp).
+void addEnergy(const Series& series, nlohmann::ordered_json& out) {
+  double put_in = 0.0, most = 0.0, paid = 0.0;
+  bool any = false;
+  for (const Row& row : series.rows) {
+    if (!inAdmittance(row.state)) continue;
+    any = true;
+    put_in = row.state.energy_put_in;
+    most = std::max(most, put_in);
+    paid = row.state.energy_paid;
+  }
+  if (!any) return;
+  out["energy_put_in_j"] = put_in;
+  out["energy_put_in_max_j"] = most;
+  if (series.experiment.controller.passivity.enabled) out["energy_paid_j"] = paid;
 }
 
 /// What gravity compensation leaves, once a calibration has been made.
@@ -151,8 +203,8 @@ void addDrift(const Series& series, nlohmann::ordered_json& out) {
 }
 
 /// How far the platform was from the robot on its base in free space.
-void addEmulation(const Series& series, ReferenceMotions& references, nlohmann::ordered_json& out) {
-  const std::optional<Emulation> e = emulation(series, references);
+void addEmulation(const Series& series, const std::optional<Emulation>& e,
+                  nlohmann::ordered_json& out) {
   if (!e) return;
   const Distance error = distance(e->platform, e->base), moved = travel(e->base);
   out["emulation_travel_m"] = moved.peak_position;
@@ -217,6 +269,31 @@ void addTiming(const Series& series, nlohmann::ordered_json& out) {
   out["messages_ignored"] = Refused{last->messages_forged, last->messages_replayed}.text();
 }
 
+/// The first few contacts, each beside the one in free space.
+std::string contactLines(const nlohmann::ordered_json& s) {
+  constexpr std::size_t kMostShown = 5;
+  std::string out = fmt::format("  contact  {} in the run", s["contacts"].get<int>());
+  if (s.contains("contacts_free_space"))
+    out += fmt::format(", {} on the base in free space", s["contacts_free_space"].get<int>());
+  out += "\n";
+  std::size_t shown = 0;
+  for (const auto& one : s["contact_list"]) {
+    if (++shown > kMostShown) break;
+    const auto cell = [&](const char* key, double scale, int digits) {
+      const auto text = [&](const std::string& name) {
+        return one.contains(name) && one[name].is_number() && std::isfinite(one[name].get<double>())
+                   ? fmt::format("{:.{}f}", one[name].get<double>() * scale, digits)
+                   : std::string("-");
+      };
+      return fmt::format("{} ({})", text(key), text(std::string("free_space_") + key));
+    };
+    out += fmt::format("           {}: after {} s for {} ms, peak {} N, restitution {}\n", shown,
+                       cell("began_s", 1.0, 2), cell("duration_s", 1e3, 1), cell("peak_n", 1.0, 2),
+                       cell("restitution", 1.0, 4));
+  }
+  return out;
+}
+
 }  // namespace
 
 nlohmann::ordered_json summarise(const Series& series, const RunResult& result) {
@@ -255,7 +332,11 @@ nlohmann::ordered_json summarise(const Series& series, const RunResult& result,
   out["log_trouble"] = result.log_trouble;
   out["real_time_factor"] = result.wall > 0.0 ? result.simulated / result.wall : 0.0;
   addTracking(series, out);
-  addEmulation(series, references, out);
+  addIndicators(series, out);
+  const std::optional<Emulation> e = emulation(series, references);
+  addEmulation(series, e, out);
+  addContacts(series, e, out);
+  addEnergy(series, out);
   addWrench(series, out);
   addDrift(series, out);
   addTiming(series, out);
@@ -329,6 +410,21 @@ std::string table(const nlohmann::ordered_json& s) {
         "mm at most\n",
         number("tool_displacement_max_m") * 1e3, number("tool_displacement_rms_m") * 1e3,
         number("tool_error_rms_m") * 1e3, number("tool_error_max_m") * 1e3);
+  if (s.contains("tracking_delay_s"))
+    out += fmt::format(
+        "  tracking {} late by {:.1f} ms; rms {:.2f} %, amplitude {:.4f}, phase {:.2f} deg (PAEI; "
+        "by frequencies {:.4f}, {:.2f} deg)\n",
+        s["tracking_coordinate"].get<std::string>(), number("tracking_delay_s") * 1e3,
+        number("tracking_rms") * 100.0, number("tracking_paei_amplitude"),
+        number("tracking_paei_phase_rad") / kDegree, number("tracking_fdb_amplitude"),
+        number("tracking_fdb_phase_rad") / kDegree);
+  if (s.contains("contacts")) out += contactLines(s);
+  if (s.contains("energy_put_in_j"))
+    out += fmt::format("  energy   the emulation has put in {:+.3f} mJ, {:.3f} at most{}\n",
+                       number("energy_put_in_j") * 1e3, number("energy_put_in_max_j") * 1e3,
+                       s.contains("energy_paid_j")
+                           ? fmt::format("; {:.3f} mJ damped away", number("energy_paid_j") * 1e3)
+                           : "");
   for (const char* when : {"still", "moving"}) {
     const std::string force = fmt::format("dynamic_force_max_{}_n", when);
     if (s.contains(force))

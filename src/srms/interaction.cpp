@@ -61,7 +61,18 @@ class Equations {
       held_ = compositeBody(robot_.model(), robot_.at(now_).q);
     }
   }
-  void begin(const RobotAction& action) { robot_.begin(action, now_); }
+  void begin(const RobotAction& action, const VectorXd& y) {
+    if (std::holds_alternative<GraspTarget>(action)) {
+      Floating target = floating(y);
+      if (interaction_.world &&
+          grasp(interaction_.world->environment, toolMotion(robot_.at(now_), platform(y)), target))
+        X_TB_ = target.X_TB;
+    } else if (std::holds_alternative<Release>(action) && X_TB_) {
+      X_TB_.reset();
+    } else {
+      robot_.begin(action, now_);
+    }
+  }
 
   void derivative(double later, const VectorXd& y, VectorXd& dy) const {
     const Eigen::Index k = modes();
@@ -106,8 +117,20 @@ class Equations {
       p.target = floating(y);
       p.touch =
           touch(interaction_.world->environment, toolMotion(robot_.at(now), platform(y)), p.target);
+      p.contacts = contacts_;
     }
     return p;
+  }
+
+  /// What touches, `later` [s] in the interval.
+  Touch touched(double later, const VectorXd& y) const {
+    return touch(interaction_.world->environment, toolMotion(robot_.at(now_, later), platform(y)),
+                 floating(y));
+  }
+  const Contact& contact() const { return contacts_.last(); }
+  bool hasWorld() const { return interaction_.world.has_value(); }
+  void see(double later, const VectorXd& y) {
+    contacts_.see(static_cast<double>(now_) * kSecondPerNanosecond + later, touched(later, y));
   }
 
   void normalise(VectorXd& y) const { y.segment<4>(attitude()).normalize(); }
@@ -122,6 +145,7 @@ class Equations {
     out.q = Eigen::Quaterniond(Eigen::Vector4d(f.segment<4>(3))).normalized();
     out.v = f.segment<3>(7);
     out.w = f.tail<3>();
+    out.X_TB = X_TB_;
     return out;
   }
   /// Where P is, and how it moves.
@@ -182,7 +206,54 @@ class Equations {
   std::int64_t now_ = 0;       // [ns] start of the interval
   std::int64_t held_at_ = -1;  // [-] step that A was last computed for
   RigidBody held_;
+  std::optional<Transform> X_TB_;  // of the target, in the tool's grip
+  ContactWatch contacts_;
 };
+
+/// The interval of `over` [s], step by step: every one is seen, and ends where the tool begins or
+/// ceases to touch.
+int passContacts(gsl_odeiv2_driver& driver, Equations& equations, double over, VectorXd& y) {
+  constexpr double kSame = 1e-12;      // [s]
+  constexpr double kInContact = 1e-3;  // [s], or
+  constexpr double kShare = 0.05;  // [-] of its duration so far: a peak is seen to 1 part in 1000
+  double now = 0.0, h = std::min(over, kInContact);
+  bool touches = equations.touched(now, y).least < 0.0;
+  equations.see(now, y);
+  while (now < over) {
+    const double before = now;
+    const VectorXd from = y;
+    const double most = std::max(kInContact, kShare * equations.contact().duration);
+    const double until = touches ? std::min(over, now + most) : over;
+    const int status = gsl_odeiv2_evolve_apply(driver.e, driver.c, driver.s, driver.sys, &now,
+                                               until, &h, y.data());
+    if (status != GSL_SUCCESS) return status;
+    if (!(now > before)) return GSL_FAILURE;
+    if ((equations.touched(now, y).least < 0.0) != touches) {
+      // One step of just that length, by halves.
+      VectorXd error(y.size());
+      double low = 0.0, high = now - before;
+      const auto step = [&](double length) {
+        y = from;
+        gsl_odeiv2_step_reset(driver.s);
+        return gsl_odeiv2_step_apply(driver.s, before, length, y.data(), error.data(), nullptr,
+                                     nullptr, driver.sys);
+      };
+      while (high - low > kSame) {
+        const double middle = 0.5 * (low + high);
+        if (!(middle > low && middle < high)) break;
+        if (const int failed = step(middle); failed != GSL_SUCCESS) return failed;
+        ((equations.touched(before + middle, y).least < 0.0) == touches ? low : high) = middle;
+      }
+      if (const int failed = step(high); failed != GSL_SUCCESS) return failed;
+      now = before + high;
+      touches = !touches;
+      h = std::min(kInContact, over);
+      gsl_odeiv2_evolve_reset(driver.e);
+    }
+    equations.see(now, y);
+  }
+  return GSL_SUCCESS;
+}
 
 }  // namespace
 
@@ -226,13 +297,15 @@ std::vector<InteractionPoint> simulate(const Interaction& interaction,
     while (now < end) {
       equations.begin(now, step);
       for (; next != interaction.actions.end() && next->start <= now; ++next)
-        equations.begin(next->action);
+        equations.begin(next->action, y);
       std::int64_t until = end;
       if (next != interaction.actions.end()) until = std::min(until, next->start);
       double later = 0.0;
       gsl_odeiv2_driver_reset(driver.get());
-      const int status = gsl_odeiv2_driver_apply(
-          driver.get(), &later, static_cast<double>(until - now) * kSecondPerNanosecond, y.data());
+      const double over = static_cast<double>(until - now) * kSecondPerNanosecond;
+      const int status = equations.hasWorld()
+                             ? passContacts(*driver, equations, over, y)
+                             : gsl_odeiv2_driver_apply(driver.get(), &later, over, y.data());
       if (status != GSL_SUCCESS)
         throw std::domain_error(
             "the tolerance cannot be kept: the motion grows without bound, or "

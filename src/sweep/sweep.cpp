@@ -56,7 +56,17 @@ constexpr const char* kNumbers[] = {"simulated_s",
                                     "dynamic_force_max_still_n",
                                     "dynamic_moment_max_still_nm",
                                     "dynamic_force_max_moving_n",
-                                    "dynamic_moment_max_moving_nm"};
+                                    "dynamic_moment_max_moving_nm",
+                                    "tracking_delay_s",
+                                    "tracking_rms",
+                                    "energy_put_in_max_j",
+                                    "contacts",
+                                    "contacts_free_space",
+                                    "contact_peak_n",
+                                    "contact_peak_free_space_n",
+                                    "contact_restitution",
+                                    "contact_restitution_free_space",
+                                    "contact_energy_error"};
 
 /// A cell of CSV.
 std::string cell(const std::string& text) {

@@ -142,6 +142,9 @@ state_t toMessage(const TickState& state, const TickInput& in, const header_t& h
   m.cause_tick = state.cause_tick;
   m.aborted = state.aborted ? 1 : 0;
   m.envelope_scale = state.envelope_scale;
+  m.energy_put_in = state.energy_put_in;
+  m.energy_paid = state.energy_paid;
+  m.passivity_damping = state.passivity_damping;
   m.late_ticks = state.late_ticks;
   m.engaged = state.command.engaged ? 1 : 0;
   m.park = state.command.park ? 1 : 0;
@@ -187,6 +190,24 @@ truth_t toMessage(const plant::Truth& truth, const header_t& header) noexcept {
   put(truth.current, m.current);
   m.parking = truth.parking ? 1 : 0;
   m.legs_agree = truth.legs_agree ? 1 : 0;
+  m.clearance = truth.clearance;
+  put(truth.contact_To_I.stacked(), m.contact);
+  m.contacts = truth.contacts.count();
+  m.touching = truth.contacts.touching() ? 1 : 0;
+  const Contact& contact = truth.contacts.last();
+  // By the header's clock, which need not begin with the plant's.
+  m.contact_began =
+      contact.began + static_cast<double>(header.time_ns - truth.time) * kSecondPerNanosecond;
+  m.contact_duration = contact.duration;
+  m.contact_peak = contact.peak;
+  put(contact.impulse, m.contact_impulse);
+  m.contact_approach = contact.approach;
+  m.contact_separation = contact.separation;
+  put(truth.target.p, m.target_p);
+  put(truth.target.q.coeffs(), m.target_q);
+  put(truth.target.v, m.target_v);
+  put(truth.target.w, m.target_w);
+  m.gripped = truth.target.X_TB ? 1 : 0;
   return m;
 }
 

@@ -121,7 +121,7 @@ Chapter4 reproduceChapter4(const fs::path& config, const fs::path& folder, int w
   Reproduction r(config, folder, progress);
   constexpr void (*kSections[])(Reproduction&) = {
       sensorSection,    ratesSection,  motionSection,      shuttleArmSection,
-      stabilitySection, massesSection, compensationSection};
+      stabilitySection, massesSection, compensationSection, contactSection};
   r.parts(std::size(kSections), [&](Reproduction& piece, std::size_t i) { kSections[i](piece); });
   if (const std::vector<std::string> open = r.openClaims(); !open.empty())
     throw InputError(fmt::format("{}: claims.{}: nothing measures it",

@@ -118,5 +118,6 @@ void shuttleArmSection(Reproduction& r);    // 4.3
 void stabilitySection(Reproduction& r);     // Appendix E
 void massesSection(Reproduction& r);        // Appendix B
 void compensationSection(Reproduction& r);  // beyond the report
+void contactSection(Reproduction& r);       // the same
 
 }  // namespace ves

@@ -112,6 +112,7 @@ Scene::Scene(const Experiment& e)
                     {"radius", 0.08 * carriedSize()},
                     {"length", payload_.X_PS.p.z()}});
   if (!e.robot.frames.empty()) addRobot(e.robot);
+  if (e.plant.world) addWorld(e.plant.world->environment);
   addArm();
 
   const auto addPose = [&](const char* what, const double(state_t::*field)[6]) {
@@ -256,6 +257,45 @@ std::set<int> Scene::addVisuals(const UrdfRobot& description) {
   return seen;
 }
 
+/// What the tool may touch. Of a half space a part of its surface.
+void Scene::addWorld(const Environment& environment) {
+  constexpr double kShown = 0.4, kThick = 0.01;  // [m]
+  Json& shapes = description_["shapes"];
+  const auto add = [&](const std::string& frame, const Transform& X, const Shape& shape) {
+    const auto put = [&](Json one, const Vec3& p_BQ_B) {
+      const Eigen::Quaterniond q(X.R);
+      one["frame"] = frame;
+      one["position"] = json(X * p_BQ_B);
+      one["quaternion"] = {q.x(), q.y(), q.z(), q.w()};
+      one["world"] = true;
+      shapes.push_back(one);
+    };
+    const auto box = [&](const Vec3& size, const Vec3& at) {
+      put({{"kind", "box"}, {"size", json(size)}}, at);
+    };
+    if (const Ball* ball = std::get_if<Ball>(&shape)) {
+      put({{"kind", "sphere"}, {"radius", ball->radius}}, Vec3::Zero());
+    } else if (const Box* block = std::get_if<Box>(&shape)) {
+      box(block->size, Vec3::Zero());
+    } else if (const Socket* socket = std::get_if<Socket>(&shape)) {
+      // Four boards around the hole, and its floor.
+      const double r = socket->radius + socket->chamfer, w = 0.5 * kShown - r;
+      for (const double side : {-1.0, 1.0}) {
+        box({w, kShown, kThick}, {side * (r + 0.5 * w), 0.0, -0.5 * kThick});
+        box({2.0 * r, w, kThick}, {0.0, side * (r + 0.5 * w), -0.5 * kThick});
+      }
+      box({2.0 * r, 2.0 * r, kThick}, {0.0, 0.0, -socket->depth - 0.5 * kThick});
+    } else {
+      box({kShown, kShown, kThick}, {0.0, 0.0, -0.5 * kThick});
+    }
+  };
+  for (const FixedBody& body : environment.bodies) add("", body.X_IB, body.shape);
+  if (!environment.target) return;
+  target_ = environment.target->start;
+  addFrame("target", "");
+  add("target", Transform(), environment.target->shape);
+}
+
 void Scene::addArm() {
   Json points = Json::array();
   const Transform X_IP = geometry_.fromHome(Pose());
@@ -294,6 +334,14 @@ std::vector<float> Scene::picture(const Row& row, const std::optional<Vec6>& bas
   const Transform X_PL0 = payload_.X_PL0();
   for (int i = 0; i < payload_.robot.size; ++i) put(X_PL0 * X_L0L[i]);
   if (tool_) put(X_PL0 * tool_->pose(X_L0L));
+  if (target_ && row.has_truth) {
+    Floating target;
+    target.p = Vec3::Map(row.truth.target_p);
+    target.q.coeffs() = Eigen::Vector4d::Map(row.truth.target_q);
+    put(target.X_IB());
+  } else if (target_) {
+    put(target_->X_IB());
+  }
   if (!arm_.points.empty()) {  // bent as the tip is moved
     const Eigen::VectorXd eta = leastSquares(Phi_, x);
     const Mat3 R_IP = geometry_.fromHome(Pose()).R;

@@ -45,6 +45,9 @@ std::vector<ProgramRobot> programRobots(const ControllerConfig& controller,
 
 /// Whether the loop decays at its worst. Much less work than the rest of the verdict.
 bool isStable(const ControllerConfig& controller, const plant::PlantConfig& plant);
+/// Whether the tool may lean on all that it is expected to touch (analysis/contact.hpp), or what
+/// that gives is taken back by the passivity controller.
+bool contactsDecay(const ControllerConfig& controller, const plant::PlantConfig& plant);
 LoopVerdict assessStability(const ControllerConfig& controller, const plant::PlantConfig& plant);
 
 /// In one line: what grows, how fast, and what would cure it.

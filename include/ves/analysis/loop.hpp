@@ -19,12 +19,23 @@
 // out: quantisation, limits, and gravity on a tilting robot, which the controller compensates.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "ves/control/test_platform.hpp"
 #include "ves/plant/plant.hpp"
 
 namespace ves {
+
+/// The robot leans on something along one direction: a spring and a damper that cannot part.
+struct Leaning {
+  // d: the wrench on the platform, about Po in I, is d times the force, and d^T x' how fast the
+  // spring is relieved. A force through p along n has d = {n, p x n}, a moment about n {0, n}.
+  Vec6 direction = Vec6::Zero();
+  double stiffness = 0.0;     // [N/m], [N m/rad]
+  double damping = 0.0;       // [N s/m], [N m s/rad]
+  double inverse_mass = 0.0;  // [1/kg], [1/(kg m^2)] of what it leans on, along d; 0: fixed
+};
 
 struct Loop {
   ModalModel base;
@@ -38,6 +49,7 @@ struct Loop {
   int readings = 1;              // [-] of the A/D converter, averaged over a period
   double late = 0.0;             // [s] by which a wrench is later than anybody knows
   int delay = 0;                 // [ticks] that a sample is older than it need be, and says so
+  std::optional<Leaning> contact;
   /// Of the compensation, when it is on.
   struct Model {
     bool feed_forward = false, inertia = false;
@@ -96,6 +108,9 @@ DominantRoot dominantRoot(const Loop& loop);
 /// Without the shape, which costs more than the root.
 double radius(const Loop& loop);
 
+/// All of them, in no order.
+Eigen::VectorXcd roots(const Loop& loop);
+
 /// No root outside the unit circle. A base that is free in a direction drifts, and a robot on it
 /// may turn drift (below 0.01 Hz) into a growth that takes minutes: that is let pass, up to 0.02/s.
 bool decays(const Loop& loop);
@@ -121,6 +136,17 @@ Margins margins(const Loop& loop);
 /// decays with the gain of either direction, the robot at q. 0 when even one diverges.
 int stableModes(const ControllerConfig& controller, const plant::PlantConfig& plant,
                 const JointVector& q);
+
+/// The loop without its contact, under a force along contact->direction whose reading [N] a tick
+/// takes: what an impact is integrated with, period by period.
+struct PushedLoop {
+  static constexpr int kSubsteps = 100;  // [-] of a period
+  Eigen::MatrixXd step;                  // the next state, from {state, reading}
+  Eigen::MatrixXd
+      places;  // kSubsteps + 1 rows: [m] of the platform along the direction, from it too
+  Eigen::MatrixXd energy;  // [J] of base and robot is state^T energy state
+};
+PushedLoop pushedLoop(const Loop& loop);
 
 /// The base with a rigid body M_1 on it, which is a modal model again: the left-hand side of
 /// (3.11).

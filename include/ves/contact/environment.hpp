@@ -28,12 +28,22 @@ struct FixedBody {
   bool operator==(const FixedBody&) const = default;
 };
 
+/// A hand that holds the target where it was when it closed, as a spring and a damper would.
+struct Grip {
+  double stiffness = 0.0, damping = 0.0;            // [N/m], [N s/m]
+  double turn_stiffness = 0.0, turn_damping = 0.0;  // [N m/rad], [N m s/rad]
+  double reach = 0.0;                               // [m] from the tool's balls, at most
+
+  bool operator==(const Grip&) const = default;
+};
+
 /// How a rigid body floats. B stands in its centre of mass.
 struct Floating {
   Vec3 p = Vec3::Zero();                                  // [m] p_IB_I
   Eigen::Quaterniond q = Eigen::Quaterniond::Identity();  // of R_IB
   Vec3 v = Vec3::Zero();                                  // [m/s] v_IB_I
   Vec3 w = Vec3::Zero();                                  // [rad/s] w_IB_I
+  std::optional<Transform> X_TB;  // in the tool's grip: where it is held, in the tool's frame
 
   Transform X_IB() const { return {q.toRotationMatrix(), p}; }
 };
@@ -55,6 +65,7 @@ struct Environment {
   ContactLaw law;
   std::vector<FixedBody> bodies;
   std::optional<Target> target;
+  std::optional<Grip> grip;
   Vec3 gravity = Vec3::Zero();  // [m/s^2] g_I, on the target
 
   bool operator==(const Environment&) const = default;
@@ -70,6 +81,8 @@ struct World {
   bool operator==(const World&) const = default;
 };
 
+class ContactWatch;
+
 /// A frame that moves.
 struct FrameMotion {
   Transform X;            // X_IT
@@ -79,11 +92,15 @@ struct FrameMotion {
 
 /// What touches, at one instant.
 struct Touch {
-  Wrench on_tool_To_I;      // on the tool, about To
-  Wrench on_target_Bo_I;    // on the target, about its centre
-  double least = HUGE_VAL;  // [m] distance of the tool from the nearest surface
-  double stored = 0.0;      // [J] in the contacts' springs
+  Wrench on_tool_To_I;            // on the tool, about To, its grip's share included
+  Wrench on_target_Bo_I;          // on the target, about its centre
+  Vec3 pressed = Vec3::Zero();    // [N] on the tool, without the grip
+  double least = HUGE_VAL;        // [m] distance of the tool from the nearest surface,
+  double closing = 0.0;           // [m/s] at which it shrinks,
+  double from_target = HUGE_VAL;  // [m] and from the target's
+  double stored = 0.0;            // [J] in the springs of contacts and grip
 };
+/// The tool does not touch what it holds.
 Touch touch(const Environment& environment, const FrameMotion& tool,
             const Floating& target) noexcept;
 
@@ -95,10 +112,14 @@ struct FloatingRates {
 FloatingRates rates(const Environment& environment, const Floating& target,
                     const Wrench& on_target_Bo_I) noexcept;
 
-/// Moves the target over dt [s] while the tool goes from one motion to the other, in Runge-Kutta
-/// steps of at most `step` [s]. Returns the mean of what touched.
+/// Closes the grip on a target within its reach; false where there is none.
+bool grasp(const Environment& environment, const FrameMotion& tool, Floating& target) noexcept;
+
+/// Moves the target over dt [s] from t [s] on while the tool goes from one motion to the other, in
+/// Runge-Kutta steps of at most `step` [s], each seen by the watch. Returns the mean of what
+/// touched.
 Touch advance(const Environment& environment, const FrameMotion& from, const FrameMotion& to,
-              double dt, double step, Floating& target) noexcept;
+              double t, double dt, double step, Floating& target, ContactWatch& watch) noexcept;
 
 /// The motion of a frame that a robot's link carries, on a base that moves.
 FrameMotion carriedFrame(const RobotModel& robot, const JointState& joints, const BodyMotion& base,

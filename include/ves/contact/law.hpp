@@ -28,6 +28,15 @@ double normalForce(const ContactLaw& law, double d, double d_dot) noexcept;
 /// v_t / sqrt(v_t^2 + slip_speed^2).
 Vec3 contactForce(const ContactLaw& law, double d, const Vec3& n, const Vec3& v) noexcept;
 
+/// Restitution of a body that arrives with `speed` [m/s], whatever its mass and the stiffness: the
+/// first integral of Hunt and Crossley's law, v/c - ln(1 + c v)/c^2, has one value on arrival and
+/// on leaving.
+double restitution(const ContactLaw& law, double speed) noexcept;
+
+/// [N/m] of a spring on which a mass [kg] that arrives with `speed` [m/s] meets the same peak
+/// force, damping aside.
+double springLike(const ContactLaw& law, double mass, double speed) noexcept;
+
 /// [J] that a spring so compressed gives back.
 double storedEnergy(const ContactLaw& law, double d) noexcept;
 

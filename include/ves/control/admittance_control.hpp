@@ -4,6 +4,7 @@
 #pragma once
 
 #include "ves/control/controller_config.hpp"
+#include "ves/control/energy_account.hpp"
 #include "ves/control/monitors.hpp"
 #include "ves/control/path_checks.hpp"
 #include "ves/control/tick_clock.hpp"
@@ -18,6 +19,7 @@ struct AdmittanceInput {
   const WrenchTiming& wrench;  // when F_Po_I was read
   const JointVector& q;        // of the robot
   const Vec6& L;               // [m] lengths last commanded
+  const Pose& measured;        // of the platform
 };
 
 class AdmittanceControl {
@@ -39,6 +41,7 @@ class AdmittanceControl {
   void forget() noexcept { oscillation_.reset(); }
 
   const Oscillation& oscillation() const noexcept { return oscillation_; }
+  const EnergyAccount& energy() const noexcept { return energy_; }
   double scale() const noexcept { return scale_; }  // [-] of the last step, 1: all of it was taken
 
  private:
@@ -49,6 +52,7 @@ class AdmittanceControl {
   double wrench_delay_;  // [s]
   bool begins_ = true;   // the first step: what was before it does not count
   Oscillation oscillation_;
+  EnergyAccount energy_;
   double period_;        // [s]
   double joint_moves_;   // [rad | m] what counts as a motion of the robot
   double growth_floor_;  // [J]

@@ -113,13 +113,15 @@ class AdmittanceModel {
   /// on the motion with M_1 that leads to x, heavy damping left out of it.
   void reset(const Vec6& x, const Mat6& M_1 = Mat6::Zero(), double ahead = 0.0) noexcept;
 
-  /// (C.6): the state one period after W began to act.
-  void step(const Wrench& F_Po_I) noexcept;
+  /// (C.6): the state one period after W began to act. `damping` [1/s] acts on every mode besides,
+  /// held with W.
+  void step(const Wrench& F_Po_I, double damping = 0.0) noexcept;
 
   /// The same `dt` [s] after, with a rigid body M_1 on the base whose inertia is not in F_Po_I:
   /// the left-hand side of (3.11). motion() is `ahead` [s] of that, F_Po_I held. dt of 0: F_Po_I
   /// has acted already.
-  void step(const Wrench& F_Po_I, const Mat6& M_1, double dt, double ahead) noexcept;
+  void step(const Wrench& F_Po_I, const Mat6& M_1, double dt, double ahead,
+            double damping = 0.0) noexcept;
 
   /// Takes back all but `share` of the last step, and of the rate it led to: all modes alike, so
   /// the path stays and only the motion along it is slowed.
@@ -128,6 +130,12 @@ class AdmittanceModel {
   /// [J] the modes are mass-normalised.
   double kineticEnergy() const noexcept { return 0.5 * now_.modes.eta_dot.squaredNorm(); }
   double energy() const noexcept { return kineticEnergy() + dynamics_.potentialEnergy(now_.modes); }
+
+  /// [J] that the last step took of F_Po_I, and that its damping took.
+  double taken(const Wrench& F_Po_I) const noexcept {
+    return F_Po_I.stacked().dot(dynamics_.Phi() * (now_.modes.eta - before_.modes.eta));
+  }
+  double damped() const noexcept { return -damping_.dot(now_.modes.eta - before_.modes.eta); }
 
   /// (C.7): position, velocity, acceleration at the last step's end, or ahead of it.
   const PathPoint<6>& motion() const noexcept { return now_.motion; }
@@ -149,7 +157,8 @@ class AdmittanceModel {
   Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::RowMajor, kMaxModes, 6> Phi_pinv_;
   double period_ = 0.0;  // [s]
   Hold step_;
-  State now_, before_;  // before the last step
+  State now_, before_;             // before the last step
+  ModalDynamics::Forces damping_;  // in the last step
   Vec6 offset_ = Vec6::Zero();
 };
 

@@ -35,6 +35,13 @@ struct Compensation {
   bool any() const noexcept { return feed_forward || observer; }
 };
 
+/// What keeps the emulation from giving energy (control/energy_account.hpp).
+struct Passivity {
+  bool enabled = false;
+  double reserve = 0.0;  // [J] that it may have given before anything is damped
+  double damping = 0.0;  // [1/s] of every mode, at most
+};
+
 /// Mean decelerations of a braking motion.
 struct Braking {
   double translation = 0.0;  // [m/s^2]
@@ -83,6 +90,7 @@ struct ControllerConfig {
   LegCodec legs;
   ServoModel servo;  // the controller's model of the servos
   Compensation compensation;
+  Passivity passivity;
   SafetyLimits safety;
   Program program;
   RecordedPath path;                  // of its path segments

@@ -26,12 +26,18 @@ struct Grasp {
   bool operator==(const Grasp&) const = default;
 };
 
-/// Lets go of it.
+/// The hand closes on what floats before it (contact/environment.hpp), which is no part of the
+/// robot.
+struct GraspTarget {
+  bool operator==(const GraspTarget&) const = default;
+};
+
+/// Lets go of either.
 struct Release {
   bool operator==(const Release&) const = default;
 };
 
-using RobotAction = std::variant<RobotMove, ToolMove, Grasp, Release>;
+using RobotAction = std::variant<RobotMove, ToolMove, Grasp, GraspTarget, Release>;
 
 double durationOf(const RobotAction& action) noexcept;  // [s]
 RobotAction slower(const RobotAction& action, double times);
@@ -43,7 +49,7 @@ class MovingRobot {
       : robot_(robot), joints_(robot.joints, q) {}
 
   /// Begins at `now` [ns]. Refused (false) where JointPaths refuses, for a second body in hand, a
-  /// link that is not there, and a release of nothing.
+  /// link that is not there, a target, and a release of nothing.
   bool begin(const RobotAction& action, std::int64_t now) noexcept;
 
   /// `later` [s] after `now` [ns].

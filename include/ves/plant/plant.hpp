@@ -17,7 +17,7 @@
 #include <optional>
 #include <vector>
 
-#include "ves/contact/environment.hpp"
+#include "ves/contact/contact_watch.hpp"
 #include "ves/control/program.hpp"
 #include "ves/control/sample.hpp"
 #include "ves/planning/moving_robot.hpp"
@@ -94,6 +94,7 @@ struct Truth {
   Wrench contact_To_I;          // on the tool from what it touches, mean over the last step
   double clearance = HUGE_VAL;  // [m] of the tool from the nearest surface, least in it
   Floating target;              // the body that floats
+  ContactWatch contacts;
   LegMotion legs;               // of the actuators, unfiltered
   Vec6 current = Vec6::Zero();  // [A] valves
   bool legs_agree = true;       // forward kinematics found a pose
@@ -111,11 +112,8 @@ class Plant {
   /// that names it.
   void command(const LegCommand& command) noexcept;
 
-  /// Begins now; false where MovingRobot::begin() refuses.
-  bool moveRobot(const RobotAction& action) noexcept {
-    standing_.reset();
-    return robot_.begin(action, now_);
-  }
+  /// Begins now; false where MovingRobot::begin() refuses, and where no target is within reach.
+  bool moveRobot(const RobotAction& action) noexcept;
 
   /// Legs, or joints, that are elsewhere: the platform, or the robot, is where they say from the
   /// next step on, and no longer where the simulated ones are.

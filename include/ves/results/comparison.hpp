@@ -17,6 +17,9 @@ namespace ves {
 struct Motion {
   std::vector<double> t;       // [s]
   std::vector<Vec6> x, x_dot;  // [m, rad], [m/s, rad/s]
+  // Of the base in free space, where there is something to touch:
+  std::vector<double> on_tool;  // [N] of what it touches or grips
+  std::vector<Contact> contacts;
 };
 
 /// Admittance control runs in this tick.

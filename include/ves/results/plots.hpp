@@ -12,8 +12,10 @@
 namespace ves {
 
 /// Draws with gnuplot pose.png, error.png, wrench.png, legs.png; servos.png where the servos are
-/// learnt; tool.png where the robot has a tool and a base to move on. Returns those that exist now.
+/// learnt; tool.png where the robot has a tool and a base to move on; contact.png where there is
+/// something to touch. Returns those that exist now.
 std::vector<std::filesystem::path> drawPlots(const Series& series,
+                                             const std::optional<Emulation>& emulation,
                                              const std::optional<ToolMotion>& tool,
                                              const std::filesystem::path& folder);
 

@@ -15,7 +15,7 @@
 #include <optional>
 #include <vector>
 
-#include "ves/contact/environment.hpp"
+#include "ves/contact/contact_watch.hpp"
 #include "ves/control/admittance_model.hpp"
 #include "ves/planning/moving_robot.hpp"
 #include "ves/robot/payload.hpp"
@@ -63,9 +63,11 @@ struct InteractionPoint {
   Mat3 R_IP = Mat3::Identity();  // whole model only
   Touch touch;                   // where there is a world
   Floating target;
+  ContactWatch contacts;  // up to now
 };
 
-/// GSL's Runge-Kutta Prince-Dormand (8, 9) with adaptive steps. Throws std::domain_error when the
+/// GSL's Runge-Kutta Prince-Dormand (8, 9) with adaptive steps; where the tool begins or ceases to
+/// touch something, a step ends to 1e-12 s. Throws std::domain_error when the
 /// tolerance cannot be kept.
 std::vector<InteractionPoint> simulate(const Interaction& interaction,
                                        const InteractionOptions& options);

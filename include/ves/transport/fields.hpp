@@ -68,6 +68,9 @@ void forEachField(const state_t& m, F f) {
   f("cause_tick", m.cause_tick);
   f("aborted", m.aborted);
   f("envelope_scale", m.envelope_scale);
+  f("energy_put_in", m.energy_put_in);
+  f("energy_paid", m.energy_paid);
+  f("passivity_damping", m.passivity_damping);
   f("late_ticks", m.late_ticks);
   f("engaged", m.engaged);
   f("park", m.park);

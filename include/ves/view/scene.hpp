@@ -41,6 +41,7 @@ class Scene {
   void addRobot(const UrdfRobot& robot);
   std::set<int> addVisuals(const UrdfRobot& robot);
   void addArm();
+  void addWorld(const Environment& environment);
   /// A large platform's robot and sensor are no larger.
   double carriedSize() const { return std::min(size_, 1.0); }
 
@@ -52,8 +53,9 @@ class Scene {
   double size_;  // [-] of the platform, the report's being 1
   Payload payload_;
   std::optional<NamedFrame> tool_;
-  ArmShape arm_;         // without points: none
-  Eigen::MatrixXd Phi_;  // 6 x k, of the base's tip
+  std::optional<Floating> target_;  // as it starts
+  ArmShape arm_;                    // without points: none
+  Eigen::MatrixXd Phi_;             // 6 x k, of the base's tip
   std::vector<std::string> frames_;
   std::vector<Scalar> scalars_;
   nlohmann::ordered_json description_;

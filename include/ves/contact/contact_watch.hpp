@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Contacts as events: when each began, how hard it was, and what came out of it.
+#pragma once
+
+#include "ves/contact/environment.hpp"
+
+namespace ves {
+
+/// From the first touch to the last; several points that touch at once are one contact.
+struct Contact {
+  double began = 0.0;           // [s]
+  double duration = 0.0;        // [s] so far, while it lasts
+  double peak = 0.0;            // [N] largest force
+  Vec3 impulse = Vec3::Zero();  // [N s] on the tool, in I
+  // [m/s] at which the gap closed before it, and opened after it: means over ContactWatch::kMean.
+  double approach = 0.0, separation = 0.0;  // separation is 0 until it is known
+
+  bool over() const { return separation != 0.0; }
+  /// Newton's coefficient.
+  double restitution() const { return separation / approach; }
+};
+
+/// Looks at what touches, in the order of time.
+class ContactWatch {
+ public:
+  /// A platform's speed swings within a controller period of 10 ms, as its command is held.
+  static constexpr double kMean = 0.01;  // [s]
+
+  /// At t [s]. A change between two looks is placed where a line through the gaps is zero.
+  void see(double t, const Touch& touch) noexcept;
+
+  int count() const noexcept { return count_; }  // [-] contacts begun so far
+  bool touching() const noexcept { return touching_; }
+  const Contact& last() const noexcept { return contact_; }
+
+ private:
+  struct Place {
+    double t, gap;  // [s], [m]
+  };
+  int count_ = 0;
+  bool touching_ = false;
+  Contact contact_;
+  double t_ = 0.0;                // [s] of the last look,
+  double gap_ = HUGE_VAL;         // [m] and what it saw
+  Vec3 force_ = Vec3::Zero();     // [N]
+  Place earlier_{0.0, HUGE_VAL};  // kMean and more ago, apart
+  Place later_{-kMean, HUGE_VAL};
+  double parted_ = -1.0;  // [s] where the speed that follows is not known yet
+  double opening_ = 0.0;  // [m/s] at that moment
+};
+
+}  // namespace ves

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// How well a motion was tracked, in the indicators that hybrid testing publishes.
+#pragma once
+
+#include <vector>
+
+namespace ves {
+
+/// Of y beside u, what it should be; without their means.
+struct TrackingIndicators {
+  double delay = 0.0;  // [s] by which u has to be moved to lie closest to y, at most half a second
+  double rms = 0.0;    // [-] of y - u, by the rms of u
+  // Phase and amplitude error indices (Mirza Hessabi and Mercan 2012, Earthquake Engng. Struct.
+  // Dyn. 41(10), 1347): of the ellipse that y over u is, here by its second moments. Phase positive
+  // where y is late.
+  double paei_amplitude = 1.0, paei_phase = 0.0;  // [-], [rad]
+  // The same from the spectra, each frequency weighed by |U|^2 (frequency domain based, FDB; in the
+  // form of Guo, Chen, Xu and Sanchez 2014, Smart Mater. Struct. 23, 045042), and the delay that
+  // the phase is at the mean frequency.
+  double fdb_amplitude = 1.0, fdb_phase = 0.0;  // [-], [rad]
+  double fdb_frequency = 0.0, fdb_delay = 0.0;  // [Hz], [s]
+};
+
+/// u and y a point every `period` [s], equally many.
+TrackingIndicators trackingIndicators(std::vector<double> u, std::vector<double> y, double period);
+
+}  // namespace ves

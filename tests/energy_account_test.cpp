@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// The books of the port between robot and platform, and the passivity controller.
+#include <gtest/gtest.h>
+
+#include "support/rig.hpp"
+#include "ves/control/energy_account.hpp"
+#include "ves/math/dense.hpp"
+
+namespace ves {
+namespace {
+
+ControllerConfig config(bool passive, double reserve = 0.0) {
+  ControllerConfig c;
+  c.servo.sensor_cutoff = 2.0 * M_PI * 50.0;
+  c.passivity = {passive, reserve, 10.0};
+  return c;
+}
+
+// A sinusoidal force on a base that moves, and a platform that is late by so much: the work that
+// the base took less the work that was done on the platform, by hand.
+TEST(EnergyAccount, IsTheDifferenceOfTwoWorks) {
+  const ControllerConfig c = config(false);
+  const double T = c.periodSeconds(), f = 20.0, w = 3.0, amplitude = 0.01;
+  const double old = wrenchDelay(c.servo, T) - 0.5 * T;  // [s] of the wrench at its tick
+  for (const double late : {0.0, 0.02, 0.1}) {
+    EnergyAccount account(c);
+    // Force f sin(w t), model at -amplitude cos(w t + 0.4): their product has a mean.
+    double taken_sum = 0.0;
+    const int periods = 3;
+    const int ticks = static_cast<int>(std::lround(periods * 2.0 * M_PI / w / T));
+    for (int k = -2; k < ticks; ++k) {
+      const double t = k * T;
+      Wrench F;
+      F.f.x() = f * std::sin(w * (t - old));
+      const auto model = [&](double at) { return -amplitude * std::cos(w * at + 0.4); };
+      const double taken = F.f.x() * (model(t - old + 0.5 * T) - model(t - old - 0.5 * T));
+      Vec6 x = Vec6::Zero();
+      x(0) = model(t - late);
+      account.take(F, x, taken, 0.0, 1.0);
+      if (k >= 0) taken_sum += taken;
+    }
+    // Over whole periods: int f sin(wt) amplitude w sin(w(t - late) + 0.4) dt.
+    const double time = periods * 2.0 * M_PI / w, whole = 0.5 * f * amplitude * w * time;
+    EXPECT_NEAR(taken_sum, whole * std::cos(0.4), 0.01 * whole) << late;
+    EXPECT_NEAR(account.putIn(), whole * (std::cos(0.4) - std::cos(0.4 - w * late)), 0.01 * whole)
+        << late;
+    EXPECT_EQ(account.damping(), 0.0);
+  }
+}
+
+TEST(EnergyAccount, DampsOnlyWhileInDebtAndWithoutSteps) {
+  const ControllerConfig c = config(true, 0.5);
+  EnergyAccount account(c);
+  const auto put = [&](double energy, double paid) {  // with the platform at rest
+    account.take(Wrench{}, Vec6::Zero(), energy, paid, 1.0);
+    return account.damping();
+  };
+  put(0.0, 0.0);
+  put(0.0, 0.0);
+  EXPECT_EQ(put(0.4, 0.0), 0.0);  // of the reserve
+  double before = 0.0;
+  for (int i = 0; i < 10; ++i) {  // and now beyond it, by 0.4 for good
+    const double now = put(i == 0 ? 0.5 : 0.0, 0.0);
+    EXPECT_GE(now, before);
+    EXPECT_LE(now - before, 2.0 + 1e-12) << "of 10 in 50 ms";
+    before = now;
+  }
+  EXPECT_NEAR(before, 10.0 * 0.4, 1e-9);  // the share of the kinetic energy that is owed
+  put(0.0, 0.4);
+  for (int i = 0; i < 10; ++i) put(0.0, 0.0);
+  EXPECT_EQ(account.damping(), 0.0);
+  // What is taken out fills the tank to its reserve and no further.
+  put(-100.0, 0.0);
+  for (int i = 0; i < 20; ++i) put(i == 0 ? 0.6 : 0.0, 0.0);
+  EXPECT_NEAR(account.damping(), 10.0 * 0.1, 1e-9);
+  EXPECT_NEAR(account.paid(), 0.4, 1e-12);
+  EXPECT_NEAR(account.putIn(), 0.4 + 0.5 - 100.0 + 0.6, 1e-9);
+  account.reset();
+  EXPECT_EQ(account.putIn(), 0.0);
+  EXPECT_EQ(account.damping(), 0.0);
+}
+
+// The model's own books: what it took of the wrench is what is in it, and what was damped away.
+TEST(AdmittanceModel, KeepsItsBooksUnderDamping) {
+  ModalModel base;
+  base.Phi = Mat6::Identity() * 0.05;
+  base.stiffness = Vec6(4.0, 9.0, 1.0, 2.0, 0.0, 25.0);
+  base.damping = Mat6::Zero();
+  Mat6 M_1 = Mat6::Zero();
+  M_1.diagonal() << 70.0, 70.0, 70.0, 8.0, 8.0, 3.0;
+  M_1(0, 4) = M_1(4, 0) = 20.0;
+  for (const bool with_robot : {false, true}) {
+    AdmittanceModel model(base, 0.01);
+    double taken = 0.0, damped = 0.0;
+    const auto energy = [&] {
+      const Vec6 x_dot = with_robot ? Vec6(model.motion().x_dot) : Vec6(Vec6::Zero());
+      return model.energy() + 0.5 * x_dot.dot(M_1 * x_dot);
+    };
+    for (int k = 0; k < 400; ++k) {
+      const Wrench F{Vec3(30.0 * std::sin(0.05 * k), 10.0, 0.0), Vec3(0.0, 5.0, 0.0)};
+      if (with_robot)
+        model.step(F, M_1, 0.01, 0.0, k > 100 ? 5.0 : 0.0);
+      else
+        model.step(F, k > 100 ? 5.0 : 0.0);
+      taken += model.taken(F);
+      damped += model.damped();
+      if (k == 100) {
+        EXPECT_EQ(damped, 0.0);
+      }
+      EXPECT_NEAR(energy(), taken - damped, 1e-9 * (1.0 + taken)) << with_robot << " " << k;
+    }
+    EXPECT_GT(damped, 0.3 * taken);
+  }
+}
+
+/// A ball of 100 kg against the PUMA on a base of 500 kg afloat.
+Experiment meeting(bool passive, bool compensated) {
+  return test::experiment(
+      "puma_on_table_4_1",
+      {"gravity_m_per_s2=0", "sensor.noise=false", "initial_pose={}",
+       "base.damping_diagonal=[0, 0, 0, 0, 0, 0]", "base.stiffness_diagonal=[0, 0, 0, 0, 0, 0]",
+       fmt::format("controller.compensation.feed_forward={}", compensated),
+       fmt::format("controller.compensation.observer={}", compensated),
+       fmt::format("controller.compensation.inertia={}", compensated),
+       fmt::format("sensor.readings_per_tick={}", compensated ? 4 : 1),
+       fmt::format("controller.passivity.enabled={}", passive),
+       "program=[{move: {}}, {calibration: {}}, {admittance: {duration_s: 2}}]",
+       "environment={tool: [{radius_m: 0.02}], contact: {stiffness: 40000}, target: {mass_kg: 100, "
+       "from_tool_m: [0.324, 0, 0], velocity_m_per_s: [-0.03, 0, 0], ball: {radius_m: 0.3}}}"});
+}
+
+struct Books {
+  double energy = 0.0, put_in = 0.0, paid = 0.0;  // [J]; at the start: the ball's
+  double most_step = 0.0;                         // [m/s^2] between two ticks' accelerations
+};
+Books books(const Experiment& e) {
+  const Mat6 M_1 =
+      spatialMass(combine(RigidBody{}, e.plant.payload.X_PL0(),
+                          compositeBody(carried(e.plant.payload), e.plant.initial_joints)));
+  const Eigen::MatrixXd inverse = leastSquares(e.controller.admittance.Phi, Mat6::Identity());
+  Lockstep machine(e.controller, e.plant);
+  machine.step({Request::kStart, {}, {}});
+  Books out;
+  Vec6 begun = Vec6::Zero(), before = Vec6::Zero();
+  int ticks = 0;
+  while (!test::done(machine.state())) {
+    const TickState& s = machine.step();
+    if (s.kind != SegmentKind::kAdmittance || s.phase != Phase::kRunning) continue;
+    const plant::Truth& t = machine.plant().truth();
+    ++ticks;
+    out.put_in = s.energy_put_in;
+    out.paid = s.energy_paid;
+    if (ticks > 120)
+      out.most_step = std::max(out.most_step, (s.motion.x_ddot - before).head<3>().norm());
+    before = s.motion.x_ddot;
+    if (ticks == 170) begun = t.x.stacked();
+    if (ticks != 190) continue;
+    const Vec6 x_dot = (t.x.stacked() - begun) / (20 * e.controller.periodSeconds());
+    const Eigen::VectorXd eta_dot = inverse * x_dot;
+    const Target& ball = *e.plant.world->environment.target;
+    out.energy =
+        0.5 * (eta_dot.squaredNorm() + x_dot.dot(M_1 * x_dot) +
+               ball.mass * t.target.v.squaredNorm() + t.target.w.dot(ball.I_Bcm_B * t.target.w)) -
+        0.5 * ball.mass * 0.03 * 0.03;
+  }
+  return out;
+}
+
+// The machine gives energy at a stiff contact; its own books say how much, and it can be taken
+// back.
+TEST(EnergyAccount, SaysWhatAMachineGivesAndTakesItBack) {
+  for (const bool compensated : {false, true}) {
+    const Books free = books(meeting(false, compensated));
+    EXPECT_GT(free.energy, compensated ? 1e-3 : 0.02) << compensated;
+    EXPECT_NEAR(free.put_in, free.energy, 0.1 * free.energy + 1e-3) << compensated;
+    EXPECT_EQ(free.paid, 0.0);
+    const Books passive = books(meeting(true, compensated));
+    EXPECT_LT(passive.energy, 0.25 * free.energy + 1e-3) << compensated;
+    EXPECT_GT(passive.paid, 0.5 * free.energy) << compensated;
+    EXPECT_LT(passive.most_step, 0.1) << compensated;
+  }
+}
+
+}  // namespace
+}  // namespace ves
