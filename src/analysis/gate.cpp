@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/analysis/gate.hpp"
-#include "ves/analysis/contact.hpp"
-#include "ves/base/coordinates.hpp"
 
 #include <fmt/format.h>
 
@@ -10,6 +8,9 @@
 #include <cmath>
 #include <optional>
 #include <set>
+
+#include "ves/analysis/contact.hpp"
+#include "ves/base/coordinates.hpp"
 
 namespace ves {
 namespace {

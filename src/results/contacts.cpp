@@ -99,6 +99,46 @@ void addContacts(const Series& series, const std::optional<Emulation>& e,
   out["contact_list"] = all;
 }
 
+void addEnergy(const Series& series, nlohmann::ordered_json& out) {
+  double put_in = 0.0, most = 0.0, paid = 0.0;
+  bool any = false;
+  for (const Row& row : series.rows) {
+    if (!inAdmittance(row.state)) continue;
+    any = true;
+    put_in = row.state.energy_put_in;
+    most = std::max(most, put_in);
+    paid = row.state.energy_paid;
+  }
+  if (!any) return;
+  out["energy_put_in_j"] = put_in;
+  out["energy_put_in_max_j"] = most;
+  if (series.experiment.controller.passivity.enabled) out["energy_paid_j"] = paid;
+}
+
+std::string contactTable(const nlohmann::ordered_json& s) {
+  constexpr std::size_t kMostShown = 5;
+  std::string out = fmt::format("  contact  {} in the run", s["contacts"].get<int>());
+  if (s.contains("contacts_free_space"))
+    out += fmt::format(", {} on the base in free space", s["contacts_free_space"].get<int>());
+  out += "\n";
+  std::size_t shown = 0;
+  for (const auto& one : s["contact_list"]) {
+    if (++shown > kMostShown) break;
+    const auto cell = [&](const char* key, double scale, int digits) {
+      const auto text = [&](const std::string& name) {
+        return one.contains(name) && one[name].is_number() && std::isfinite(one[name].get<double>())
+                   ? fmt::format("{:.{}f}", one[name].get<double>() * scale, digits)
+                   : std::string("-");
+      };
+      return fmt::format("{} ({})", text(key), text(std::string("free_space_") + key));
+    };
+    out += fmt::format("           {}: after {} s for {} ms, peak {} N, restitution {}\n", shown,
+                       cell("began_s", 1.0, 2), cell("duration_s", 1e3, 1), cell("peak_n", 1.0, 2),
+                       cell("restitution", 1.0, 4));
+  }
+  return out;
+}
+
 void writeContacts(const std::vector<ContactPair>& pairs, const std::string& file) {
   try {
     auto out = fmt::output_file(file);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "reproduction.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 #include "ves/results/contacts.hpp"
@@ -40,6 +39,7 @@ void oneContact(Reproduction& r, const Case& which, const std::string& robot, bo
   const std::optional<Emulation> e = r.emulation(run.series);
   Numbers of_run;
   addContacts(run.series, e, of_run);
+  addEnergy(run.series, of_run);
   const auto number = [&](const char* key) {
     return of_run.contains(key) ? of_run[key].get<double>() : NAN;
   };
@@ -50,19 +50,15 @@ void oneContact(Reproduction& r, const Case& which, const std::string& robot, bo
     row.insert(row.end(), {cell(number("contacts_free_space"), 0),
                            cell(number("contact_peak_free_space_n"), 1),
                            cell(number("contact_restitution_free_space"), 3)});
-  double most = 0.0;
-  for (const Row& one : run.series.rows)
-    if (inAdmittance(one.state)) most = std::max(most, one.state.energy_put_in);
   const bool good = run.result.good();
   row.insert(row.end(), {good ? cell(number("contacts"), 0) : std::string(name(run.result.cause)),
                          cell(number("contact_peak_n"), 1), cell(number("contact_restitution"), 3),
-                         cell(kMilli * most, 1)});
+                         cell(kMilli * number("energy_put_in_max_j"), 1)});
   Numbers& own = numbers[scenario + (which.set.empty() ? "" : "_500_kg")]
                         [published ? "as_published" : "compensated"];
   own = of_run;
   own.erase("contact_list");
   own["ended"] = name(run.result.phase);
-  own["energy_put_in_max_j"] = most;
   if (which.scenario != std::string("contact_rebound") || !which.set.empty() || robot != "puma")
     return;
   const auto line = [&](const char* title, int colour, bool dashed, const auto& value) {

@@ -14,12 +14,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <map>
-#include <random>
-#include <thread>
 
+#include "machines.hpp"
 #include "support/rig.hpp"
 #include "ves/analysis/contact.hpp"
 #include "ves/analysis/gate.hpp"
@@ -29,27 +27,14 @@
 namespace ves {
 namespace {
 
-using Sets = std::vector<std::string>;
+using test::Dice;
+using test::forEach;
+using test::Sets;
+using test::with;
+
 const Sets kCompensated = {"controller.compensation.feed_forward=true",
                            "controller.compensation.observer=true",
                            "controller.compensation.inertia=true", "sensor.readings_per_tick=4"};
-
-Sets with(Sets set, const Sets& more) {
-  set.insert(set.end(), more.begin(), more.end());
-  return set;
-}
-
-/// Runs fn(0), .. fn(n - 1) on all cores.
-template <class F>
-void forEach(int n, const F& fn) {
-  std::atomic<int> next{0};
-  std::vector<std::thread> workers;
-  for (unsigned w = 0; w < std::max(1u, std::thread::hardware_concurrency()); ++w)
-    workers.emplace_back([&] {
-      for (int i; (i = next++) < n;) fn(i);
-    });
-  for (std::thread& worker : workers) worker.join();
-}
 
 constexpr double kBase = 500.0;  // [kg] afloat in space, the robot on it besides
 constexpr double kAnswer = 1.2;  // [s] after the contact
@@ -255,10 +240,8 @@ int random(int n, unsigned seed, const Sets& more) {
   };
   std::vector<Ended> all(static_cast<std::size_t>(n));
   forEach(n, [&](int i) {
-    std::mt19937 engine(seed + static_cast<unsigned>(i));
-    const auto draw = [&](double a, double b) {
-      return std::uniform_real_distribution<double>(a, b)(engine);
-    };
+    Dice dice(seed + static_cast<unsigned>(i));
+    const auto draw = [&](double a, double b) { return dice.between(a, b); };
     const auto place = [&](double r) {
       Vec3 v(draw(-1, 1), draw(-1, 1), draw(-1, 1));
       return Vec3(v.normalized() * r);

@@ -15,12 +15,10 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <atomic>
 #include <deque>
 #include <map>
-#include <random>
-#include <thread>
 
+#include "machines.hpp"
 #include "support/rig.hpp"
 #include "ves/analysis/gate.hpp"
 #include "ves/results/comparison.hpp"
@@ -28,29 +26,16 @@
 namespace ves {
 namespace {
 
-using Sets = std::vector<std::string>;
+using test::Dice;
+using test::forEach;
+using test::Sets;
+using test::with;
+
 const Sets kCompensated = {"controller.compensation.feed_forward=true",
                            "controller.compensation.observer=true",
                            "controller.compensation.inertia=true", "sensor.noise=false"};
 
-Sets with(Sets set, const Sets& more) {
-  set.insert(set.end(), more.begin(), more.end());
-  return set;
-}
-
 constexpr const char* kArms[] = {"unberth", "low_hover", "deploy", "capture"};
-
-class Dice {
- public:
-  explicit Dice(unsigned seed) : engine_(seed) {}
-  double between(double a, double b) {
-    return std::uniform_real_distribution<double>(a, b)(engine_);
-  }
-  int whole(int a, int b) { return std::uniform_int_distribution<int>(a, b)(engine_); }
-
- private:
-  std::mt19937 engine_;
-};
 
 struct Ended {
   Series series;
@@ -103,18 +88,6 @@ Ended run(const Experiment& e, std::int64_t jitter, std::size_t late, unsigned s
   return out;
 }
 
-/// fn(0) .. fn(n - 1) on two threads.
-template <class Function>
-void all(int n, const Function& fn) {
-  std::atomic<int> next = 0;
-  const auto work = [&] {
-    for (int i = next++; i < n; i = next++) fn(i);
-  };
-  std::thread other(work);
-  work();
-  other.join();
-}
-
 double at(std::vector<double> values, double share) {
   std::sort(values.begin(), values.end());
   return values.empty()
@@ -150,7 +123,7 @@ int emulations(int n, unsigned seed, const Sets& set) {
     double off = NAN;  // [-] rms over peak
   };
   std::vector<One> ones(static_cast<std::size_t>(n));
-  all(n, [&](int i) {
+  forEach(n, [&](int i) {
     Dice dice(seed + static_cast<unsigned>(i));
     One& one = ones[static_cast<std::size_t>(i)];
     one.where = i % 3;
@@ -207,7 +180,7 @@ int gates(int n, unsigned seed, const Sets& set) {
     std::string what;
   };
   std::vector<One> ones(static_cast<std::size_t>(n));
-  all(n, [&](int i) {
+  forEach(n, [&](int i) {
     Dice dice(seed + static_cast<unsigned>(i));
     One& one = ones[static_cast<std::size_t>(i)];
     const double ratio = dice.between(1.0, 20.0), hertz = std::exp(dice.between(-0.7, 3.0)),

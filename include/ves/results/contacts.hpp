@@ -3,9 +3,9 @@
 // The contacts of a run beside those that the robot would have had on its base in free space.
 #pragma once
 
-#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "ves/results/comparison.hpp"
@@ -31,7 +31,13 @@ std::vector<ContactPair> contactPairs(const Series& series, const std::optional<
 void addContacts(const Series& series, const std::optional<Emulation>& e,
                  nlohmann::ordered_json& out);
 
-/// A line a contact.
+/// The energy account of admittance control (control/energy_account.hpp).
+void addEnergy(const Series& series, nlohmann::ordered_json& out);
+
+/// Of a summary with contacts: the first few, each beside the one in free space.
+std::string contactTable(const nlohmann::ordered_json& summary);
+
+/// A CSV file, a line a contact.
 void writeContacts(const std::vector<ContactPair>& pairs, const std::string& file);
 
 }  // namespace ves
