@@ -106,6 +106,7 @@ struct Outcome {
   bool measured = false;        // to the end of admittance control,
   Check cause = Check::kCount;  // or what stopped it
   double error = NAN;           // [-] energy beyond free space, by the energy of approach
+  double left = NAN;            // [-] of it, were base and robot to stop once the ball has gone
   double account = NAN;         // [-] what the controller's own books say, by the same
   double restitution = NAN, due = NAN;
   double peak = NAN, peak_due = NAN;    // [N]
@@ -164,6 +165,7 @@ Outcome measure(double mass, double stiffness, const Sets& more) {
   out.measured = machine.state().cause == Check::kCount;
   out.cause = machine.state().cause;
   out.error = (energy - due_energy) / met.approach;
+  out.left = (books(Vec6::Zero(), Vec6::Zero(), target) - due_energy) / met.approach;
   out.restitution = first.restitution();
   out.due = due.restitution();
   out.peak = first.peak;
@@ -329,8 +331,8 @@ int map(const Sets& more) {
   forEach(kSide * kSide, [&](int i) {
     all[static_cast<std::size_t>(i)] = measure(massOf(i), stiffnessOf(i), more);
   });
-  fmt::print("{:>8} {:>9} {:>8} {:>10} {:>10} {:>10} {:>10} {:>9} {:>9} {:>9} {:>9} {:>9}\n", "kg",
-             "N/m", "ended", "error", "foretold", "account", "growth/s", "e", "e free", "peak N",
+  fmt::print("{:>8} {:>9} {:>8} {:>10} {:>10} {:>10} {:>10} {:>10} {:>9} {:>9} {:>9} {:>9} {:>9}\n", "kg",
+             "N/m", "ended", "error", "in ball", "foretold", "account", "growth/s", "e", "e free", "peak N",
              "free N", "damped");
   // Whole counts of legs and sensor hide what is less: both run with the noise off.
   constexpr double kSeen = 0.02;  // [-]
@@ -339,9 +341,9 @@ int map(const Sets& more) {
   for (int i = 0; i < kSide * kSide; ++i) {
     const Outcome& o = all[static_cast<std::size_t>(i)];
     fmt::print(
-        "{:>8.1f} {:>9.3g} {:>8} {:>+10.4f} {:>+10.4f} {:>+10.4f} {:>+10.4f} {:>9.4f} "
+        "{:>8.1f} {:>9.3g} {:>8} {:>+10.4f} {:>+10.4f} {:>+10.4f} {:>+10.4f} {:>+10.4f} {:>9.4f} "
         "{:>9.4f} {:>9.2f} {:>9.2f} {:>9.3f}\n",
-        massOf(i), stiffnessOf(i), o.measured ? "well" : name(o.cause), o.error, o.foretold,
+        massOf(i), stiffnessOf(i), o.measured ? "well" : name(o.cause), o.error, o.left, o.foretold,
         o.account, o.growth, o.restitution, o.due, o.peak, o.peak_due, o.paid);
     if (!o.measured) continue;
     ++looked;
