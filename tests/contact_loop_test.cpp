@@ -226,6 +226,48 @@ TEST(ExpectedContacts, AreFoundWhereTheRobotGoes) {
   EXPECT_TRUE(expectedContacts(elsewhere.controller, elsewhere.plant).empty());
 }
 
+// A target that is far off may come near, and one that is near may be on its way from there.
+TEST(ExpectedContacts, FollowATargetOnItsWay) {
+  const auto found = [](double away, double speed) {
+    const Experiment e =
+        meeting(100.0, 2e3,
+                {"program=[{move: {}}, {calibration: {}}, {admittance: {duration_s: 3}}]",
+                 fmt::format("environment.target.from_tool_m=[{}, 0, 0]", away),
+                 fmt::format("environment.target.velocity_m_per_s=[{}, 0, 0]", speed)});
+    return expectedContacts(e.controller, e.plant);
+  };
+  const std::vector<ExpectedContact> comes = found(0.45, -0.06);  // touches after 2.2 s
+  ASSERT_EQ(comes.size(), 1U);
+  EXPECT_NEAR(comes[0].speed, 0.06, 1e-12);
+  EXPECT_TRUE(found(0.45, 0.06).empty());
+  EXPECT_TRUE(found(0.45, -0.02).empty());
+}
+
+// A grip holds the target at its centre, where the plant has it then.
+TEST(ExpectedContacts, HoldTheTargetWhereThePlantDoes) {
+  const Experiment e = test::experiment("contact_capture_puma");
+  const std::vector<ExpectedContact> all = expectedContacts(e.controller, e.plant);
+  Lockstep machine(e.controller, e.plant);
+  machine.step({Request::kStart, {}, {}});
+  while (!machine.plant().truth().target.X_TB && !test::done(machine.state())) machine.step();
+  ASSERT_TRUE(machine.plant().truth().target.X_TB);
+  const Vec3 lever =
+      machine.plant().truth().target.p - e.controller.geometry.fromHome({}).p;  // [m] from Po
+  int grips = 0;
+  for (const ExpectedContact& one : all) {
+    if (one.name.rfind("grip ", 0) != 0) continue;
+    ++grips;
+    const Vec3 n = one.leaning.direction.head<3>();
+    if (n.isZero(0.0)) {
+      EXPECT_EQ(one.leaning.direction.tail<3>().norm(), 1.0) << one.name;
+      continue;
+    }
+    EXPECT_LT((one.leaning.direction.tail<3>() - lever.cross(n)).norm(), 0.03) << one.name;
+    EXPECT_NEAR(one.leaning.inverse_mass, 1.0 / 100.0, 1e-12);
+  }
+  EXPECT_EQ(grips, 6);
+}
+
 // Undamped, published, stiff: leaning on it grows. Refused by name; compensated and soft it passes.
 TEST(ContactGate, RefusesWhatWouldGrow) {
   const auto verdict = [](double k, std::vector<std::string> set) {

@@ -7,6 +7,7 @@
 #include "support/rig.hpp"
 #include "ves/config/experiment.hpp"
 #include "ves/plant/plant.hpp"
+#include "ves/results/contacts.hpp"
 #include "ves/results/summary.hpp"
 #include "ves/srms/interaction.hpp"
 #include "ves/transport/messages.hpp"
@@ -483,6 +484,36 @@ TEST(ContactResults, StandBesideFreeSpace) {
   EXPECT_EQ(last("contacts"), 1.0);
   EXPECT_NEAR(last("x_target_rate_m_per_s"), machine.plant().truth().target.v.x(), 1e-12);
   EXPECT_GT(last("clearance_m"), 0.0);
+}
+
+// What has been before admittance control is not counted; what still touches as it begins is.
+TEST(ContactResults, BeginWithAdmittanceControl) {
+  Series series;
+  const auto row = [&](bool in_admittance, int contacts, bool touching, double began) {
+    Row out;
+    out.state = {};
+    out.truth = {};
+    out.state.phase = static_cast<int>(Phase::kRunning);
+    out.state.kind =
+        static_cast<int>(in_admittance ? SegmentKind::kAdmittance : SegmentKind::kCalibration);
+    out.state.segment = in_admittance ? 1 : 0;
+    out.state.machine_time_ns = 10'000'000 * std::ssize(series.rows);
+    out.has_truth = true;
+    out.truth.contacts = contacts;
+    out.truth.touching = touching;
+    out.truth.contact_began = began;
+    series.rows.push_back(out);
+  };
+  row(false, 2, true, 0.0);
+  row(true, 2, true, 0.0);
+  row(true, 2, false, 0.0);
+  row(true, 3, true, 0.025);
+  const std::vector<Contact> touched = contactsOf(series);
+  ASSERT_EQ(touched.size(), 2U);
+  EXPECT_NEAR(touched[0].began, -0.01, 1e-12);
+  EXPECT_NEAR(touched[1].began, 0.015, 1e-12);
+  series.rows.erase(series.rows.begin(), series.rows.begin() + 2);  // that one has parted by then
+  ASSERT_EQ(contactsOf(series).size(), 1U);
 }
 
 TEST(ContactConfig, IsRefusedByName) {

@@ -114,6 +114,37 @@ TEST(AdmittanceModel, KeepsItsBooksUnderDamping) {
   }
 }
 
+// Damping takes momentum from base and robot alike: what is afloat, coupled or not, keeps going its
+// way and loses the same share of its speed each step.
+TEST(AdmittanceModel, IsDampedAlongItsWay) {
+  ModalModel base;
+  base.Phi = Mat6::Identity() * 0.05;
+  base.Phi(0, 4) = 0.02;
+  base.stiffness = Vec6::Zero();
+  base.damping = Mat6::Zero();
+  Mat6 M_1 = Mat6::Zero();
+  M_1.diagonal() << 700.0, 700.0, 700.0, 80.0, 80.0, 30.0;
+  M_1(0, 4) = M_1(4, 0) = 200.0;
+  const double T = 0.01, rate = 5.0;
+  for (const bool with_robot : {false, true}) {
+    AdmittanceModel model(base, T);
+    const auto step = [&](const Wrench& F, double damping) {
+      if (with_robot)
+        model.step(F, M_1, T, 0.0, damping);
+      else
+        model.step(F, damping);
+      return Vec6(model.motion().x_dot);
+    };
+    const Vec6 start = step({Vec3(30.0, -20.0, 10.0), Vec3(5.0, 1.0, -7.0)}, 0.0);
+    ASSERT_GT(start.norm(), 1e-4);
+    double left = 1.0;
+    for (int k = 0; k < 50; ++k) {
+      left *= 1.0 - rate * T;  // held over the step
+      EXPECT_LT((step({}, rate) - left * start).norm(), 1e-12 * start.norm()) << with_robot;
+    }
+  }
+}
+
 /// A ball of 100 kg against the PUMA on a base of 500 kg afloat.
 Experiment meeting(bool passive, bool compensated) {
   return test::experiment(

@@ -12,7 +12,6 @@ void ContactWatch::see(double t, const Touch& now) noexcept {
       known && touches != touching_ ? std::clamp(gap_ / (gap_ - now.least), 0.0, 1.0) : 1.0;
   const double changed = known ? t_ + share * (t - t_) : t;
   if (touches && !touching_) {
-    if (parted_ >= 0.0) contact_.separation = opening_;  // again, too soon for a mean
     parted_ = -1.0;
     ++count_;
     contact_ = {};
@@ -29,7 +28,6 @@ void ContactWatch::see(double t, const Touch& now) noexcept {
   if (touches) contact_.peak = std::max(contact_.peak, now.pressed.norm());
   if (touching_ && !touches) {
     parted_ = changed;
-    opening_ = -now.closing;
     earlier_ = later_ = {changed, 0.0};
   }
   if (parted_ >= 0.0 && t - parted_ >= kMean) {

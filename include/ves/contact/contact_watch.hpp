@@ -47,7 +47,6 @@ class ContactWatch {
   Place earlier_{0.0, HUGE_VAL};  // kMean and more ago, apart
   Place later_{-kMean, HUGE_VAL};
   double parted_ = -1.0;  // [s] where the speed that follows is not known yet
-  double opening_ = 0.0;  // [m/s] at that moment
 };
 
 }  // namespace ves
