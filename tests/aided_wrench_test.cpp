@@ -15,7 +15,8 @@
 namespace ves {
 namespace {
 
-constexpr std::int64_t kTick = 10'000'000;  // [ns]
+using test::kTick;
+
 const std::vector<std::string> kAided = {
     "controller.compensation.feed_forward=true", "controller.compensation.observer=true",
     "controller.compensation.inertia=true", "controller.compensation.wrench=aided"};

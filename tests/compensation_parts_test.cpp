@@ -19,17 +19,10 @@ namespace {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using test::experiment;
+using test::kCompensated;
+using test::kTick;
 using test::Leg;
-
-constexpr std::int64_t kTick = 10'000'000;  // [ns]
-
-const std::vector<std::string> kAll = {"controller.compensation.feed_forward=true",
-                                       "controller.compensation.observer=true",
-                                       "controller.compensation.inertia=true"};
-
-Experiment experiment(const std::string& name, const std::vector<std::string>& set) {
-  return test::experiment(name, set);
-}
 
 // The base with a body on it
 
@@ -224,7 +217,7 @@ TEST(ModalHold, CouplingDampingBesideStiffModesKeepsItsDigits) {
 // The servo
 
 TEST(FeedForward, LegFollowsASineWithoutItsLag) {  // both directions; published: 18 and 27 percent
-  const Experiment e = experiment("z_sine", kAll);
+  const Experiment e = experiment("z_sine", kCompensated);
   for (const double hertz : {0.5, 2.0}) {
     const double w = 2.0 * M_PI * hertz, amplitude = 0.4 / w, T = 0.01, middle = 1.5;
     Leg leg(e.plant, middle);
@@ -244,7 +237,7 @@ TEST(FeedForward, LegFollowsASineWithoutItsLag) {  // both directions; published
 }
 
 TEST(FeedForward, NeverAsksForMoreThanTheRail) {
-  const ServoModel servo = experiment("z_sine", kAll).controller.servo;
+  const ServoModel servo = experiment("z_sine", kCompensated).controller.servo;
   for (const double v : {-50.0, -1.0, 0.3, 2.0, 80.0}) {
     LegMotion legs;
     legs.L.setConstant(1.5);
@@ -257,7 +250,7 @@ TEST(FeedForward, NeverAsksForMoreThanTheRail) {
 }
 
 TEST(FeedForward, LeadsARampByItsDelayToo) {
-  const ServoModel servo = experiment("z_sine", kAll).controller.servo;
+  const ServoModel servo = experiment("z_sine", kCompensated).controller.servo;
   ServoModel late = servo;
   late.delay.setConstant(0.004);
   for (const double v : {-0.3, 0.2}) {
@@ -269,7 +262,7 @@ TEST(FeedForward, LeadsARampByItsDelayToo) {
 }
 
 TEST(FeedForward, ShareZeroIsTheReportsReference) {
-  const ServoModel servo = experiment("z_sine", kAll).controller.servo;
+  const ServoModel servo = experiment("z_sine", kCompensated).controller.servo;
   const LegMotion legs{Vec6::Constant(1.5), Vec6::Constant(0.3), Vec6::Constant(-2.0)};
   EXPECT_EQ(feedForward(servo, legs, 0.01, 0.01, 0.0), legs.L);
 }
@@ -277,7 +270,7 @@ TEST(FeedForward, ShareZeroIsTheReportsReference) {
 class Derivative : public testing::TestWithParam<int> {};  // K_D of the LegSlave
 
 TEST_P(Derivative, ServoObserverKnowsSpeedAndLengthBelowACount) {
-  Experiment e = experiment("z_sine", kAll);
+  Experiment e = experiment("z_sine", kCompensated);
   e.plant.leg_slave.K_D = GetParam();
   e.controller.servo.derivative =
       plant::nominalServo(e.plant.leg_slave, e.plant.actuator, e.plant.transducer).derivative;
@@ -312,7 +305,7 @@ INSTANTIATE_TEST_SUITE_P(Gains, Derivative, testing::Values(0, 3000),
                          testing::PrintToStringParamName());
 
 TEST(ServoObserver, RoundingIsThatOfTheReading) {
-  const Experiment e = experiment("z_sine", kAll);
+  const Experiment e = experiment("z_sine", kCompensated);
   const double scale = e.plant.transducer.scale, edge = e.plant.transducer.offset + 9000 * scale;
   ServoObserver observer(e.controller.servo, 0.01);
   for (const double part : {-0.45, -0.2, 0.0, 0.3, 0.45}) {
@@ -330,7 +323,7 @@ TEST(ServoObserver, RoundingIsThatOfTheReading) {
 }
 
 TEST(ServoObserver, RoundingIsOfWhereTheLegsAreByThen) {
-  const Experiment e = experiment("z_sine", kAll);
+  const Experiment e = experiment("z_sine", kCompensated);
   const double scale = e.plant.transducer.scale;
   ServoObserver observer(e.controller.servo, 0.01);
   observer.reset(Vec6::Constant(1.5), 0);
@@ -344,7 +337,7 @@ TEST(ServoObserver, RoundingIsOfWhereTheLegsAreByThen) {
 }
 
 TEST(ServoObserver, RestsWhereItIsReset) {
-  const Experiment e = experiment("z_sine", kAll);
+  const Experiment e = experiment("z_sine", kCompensated);
   ServoObserver observer(e.controller.servo, 0.01);
   observer.reset(Vec6::Constant(1.5), 0);
   observer.send(Vec6::Constant(1.6), 0, 0);
@@ -359,7 +352,7 @@ TEST(ServoObserver, RestsWhereItIsReset) {
 }
 
 TEST(ServoObserver, ReadingBoundsItWhateverTheModel) {
-  Experiment e = experiment("z_sine", kAll);
+  Experiment e = experiment("z_sine", kCompensated);
   e.controller.servo.extend *= 1.5;
   e.controller.servo.jitter = 0.0;
   ServoObserver observer(e.controller.servo, 0.01);
@@ -378,7 +371,7 @@ TEST(ServoObserver, ReadingBoundsItWhateverTheModel) {
 /// sensor's filter makes of the machine's own acceleration, by small steps.
 struct SideBySide {
   explicit SideBySide(const ServoModel& servo, std::int64_t late = 0)
-      : e(experiment("z_sine", kAll)), leg(e.plant, 1.5), observer(servo, 0.01) {
+      : e(experiment("z_sine", kCompensated)), leg(e.plant, 1.5), observer(servo, 0.01) {
     observer.reset(Vec6::Constant(1.5), 0);
     Butterworth2<1> filter(e.plant.sensor.cutoff);
     const auto step = filter.prepare(kStep * 1e-9);
@@ -434,7 +427,7 @@ struct SideBySide {
 };
 
 TEST(ServoObserver, FeelsWhatTheSensorFeelsAtOnceAndOnAverage) {
-  ServoModel servo = experiment("z_sine", kAll).controller.servo;
+  ServoModel servo = experiment("z_sine", kCompensated).controller.servo;
   const SideBySide at_once(servo);
   servo.sensor_window = 0.01;
   const SideBySide mean(servo);
@@ -448,7 +441,7 @@ TEST(ServoObserver, FeelsWhatTheSensorFeelsAtOnceAndOnAverage) {
 }
 
 TEST(ServoObserver, ASensorThatIsLaterShowsWhatWas) {
-  ServoModel servo = experiment("z_sine", kAll).controller.servo;
+  ServoModel servo = experiment("z_sine", kCompensated).controller.servo;
   for (const std::int64_t window : {std::int64_t{0}, kTick})
     for (const double delay : {-4e-4, 4e-4}) {
       servo.sensor_window = static_cast<double>(window) * 1e-9;
@@ -462,7 +455,7 @@ TEST(ServoObserver, ASensorThatIsLaterShowsWhatWas) {
 }
 
 TEST(ServoObserver, ACommandCountsFromWhenTheMachineSaysItCame) {
-  ServoModel servo = experiment("z_sine", kAll).controller.servo;
+  ServoModel servo = experiment("z_sine", kCompensated).controller.servo;
   servo.sensor_window = 0.01;
   const SideBySide told(servo, 4'000'000);
   EXPECT_LT(told.off(told.modelled, kTick), 0.02);
@@ -480,7 +473,7 @@ TEST(ServoObserver, ACommandCountsFromWhenTheMachineSaysItCame) {
 }
 
 TEST(ServoObserver, AReadingIsComparedWithTheModelAtItsOwnTime) {
-  Experiment e = experiment("z_sine", kAll);
+  Experiment e = experiment("z_sine", kCompensated);
   e.controller.servo.jitter = 0.0;
   ServoObserver observer(e.controller.servo, 0.01);
   observer.reset(Vec6::Constant(1.5), 0);

@@ -23,18 +23,11 @@ namespace {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using test::experiment;
+using test::kCompensated;
 using test::Rig;
 
 const std::vector<std::string> kPublished;
-const std::vector<std::string> kAll = {"controller.compensation.feed_forward=true",
-                                       "controller.compensation.observer=true",
-                                       "controller.compensation.inertia=true"};
-
-Experiment experiment(const std::string& name, std::vector<std::string> set,
-                      const std::vector<std::string>& more = {}) {
-  set.insert(set.end(), more.begin(), more.end());
-  return test::experiment(name, set);
-}
 
 /// The same, with the verdict of the stability check.
 Experiment assessed(const std::string& name, std::vector<std::string> set,
@@ -71,7 +64,7 @@ Vec6 settledError(const Series& series, int segment, const std::function<Vec6(do
 
 TEST_F(Emulation, SinesOf421AreFollowedWithinAPercent) {  // noise and counts on
   for (const auto& [name, i] : {std::pair{"z_sine", 2}, std::pair{"alpha_sine", 3}}) {
-    const Experiment e = experiment(name, kAll);
+    const Experiment e = experiment(name, kCompensated);
     const Axis axis = e.controller.program.segments[1].trajectory[static_cast<std::size_t>(i)];
     const Series series = run(e);
     ASSERT_TRUE(result_.good());
@@ -83,7 +76,7 @@ TEST_F(Emulation, SinesOf421AreFollowedWithinAPercent) {  // noise and counts on
 }
 
 TEST_F(Emulation, FreeDecayOfTable41IsTheClosedFormsOwn) {
-  const Series series = run(experiment("free_decay", kAll));
+  const Series series = run(experiment("free_decay", kCompensated));
   ASSERT_TRUE(result_.good());
   const double m[] = {500, 500, 500, 250, 250, 250}, k[] = {1500, 2500, 4000, 1500, 1000, 2000};
   Vec6 offset;
@@ -128,7 +121,8 @@ TEST_F(Emulation, DossOnTheShuttlesArmMovesAsTheMovingBaseDoes) {
         std::vector<std::string> more = {"sensor.noise=false"};
         if (six) more.push_back("base.keep_modes=6");
         if (mean) more = with(more, kMean);
-        const Experiment e = assessed(std::string("srms_") + configuration + "_doss", kAll, more);
+        const Experiment e =
+            assessed(std::string("srms_") + configuration + "_doss", kCompensated, more);
         EXPECT_EQ(e.controller.stability, Stability::kStable) << e.name;
         const Series series = run(e);
         ASSERT_TRUE(result_.good()) << e.name;
@@ -140,7 +134,7 @@ TEST_F(Emulation, DossOnTheShuttlesArmMovesAsTheMovingBaseDoes) {
 TEST_F(Emulation, ABeliefThatIsAMillisecondOffCostsAPercentWhereReadingsAreAveraged) {
   // Read once a tick, in step with the command's staircase, it costs ten times as much.
   for (const double delay : {-0.001, 0.001}) {
-    Experiment e = experiment("srms_deploy_doss", kAll,
+    Experiment e = experiment("srms_deploy_doss", kCompensated,
                               with({"sensor.noise=false", "base.keep_modes=6"}, kMean));
     e.controller.servo.delay.setConstant(delay);
     const Series series = run(e);
@@ -152,7 +146,7 @@ TEST_F(Emulation, ABeliefThatIsAMillisecondOffCostsAPercentWhereReadingsAreAvera
 TEST_F(Emulation, SamplesThatComeLateAndSaySoAreUsedForWhatTheyAreWorth) {
   for (const int ticks : {1, 3}) {
     const Experiment e = assessed(
-        "srms_capture_doss", kAll,
+        "srms_capture_doss", kCompensated,
         with({"sensor.noise=false", "base.keep_modes=6",
               "program=[{move: {}, faults: [{at_s: 0, duration_s: 100, fault: samples_late, "
               "samples: " +
@@ -196,10 +190,10 @@ TEST_F(Emulation, MassRatioOfFiveMovesAsItShouldUpToTwelveHertz) {  // Appendix 
     EXPECT_FALSE(runLockstep(published, nullptr, nullptr).good());
 
     // At twelve hertz the belief has to be better than it is taken for without an identification.
-    EXPECT_EQ(assessed("puma_on_table_4_1", kAll, with(set, kMean)).controller.stability,
+    EXPECT_EQ(assessed("puma_on_table_4_1", kCompensated, with(set, kMean)).controller.stability,
               hertz < 10.0 ? Stability::kStable : Stability::kUnstable);
     const Experiment e =
-        assessed("puma_on_table_4_1", kAll,
+        assessed("puma_on_table_4_1", kCompensated,
                  with(with(set, kMean), {"controller.compensation.timing_error_s=1e-4",
                                          "controller.compensation.gain_error=0.02",
                                          "controller.compensation.mass_error=0.02"}));
@@ -211,7 +205,7 @@ TEST_F(Emulation, MassRatioOfFiveMovesAsItShouldUpToTwelveHertz) {  // Appendix 
 }
 
 const std::vector<std::string> kAdapts = {"controller.compensation.adaptation=true"};
-const std::vector<std::string> kAided = {"controller.compensation.wrench=aided"};
+const std::vector<std::string> kAidedWrench = {"controller.compensation.wrench=aided"};
 
 TEST_F(Emulation, GainsThatAreFivePercentOffAreLearnt) {
   for (const char* gains :
@@ -220,7 +214,7 @@ TEST_F(Emulation, GainsThatAreFivePercentOffAreLearnt) {
     const std::vector<std::string> set =
         with(with({"sensor.noise=false", "base.keep_modes=6"}, kMean),
              {std::string("plant_mismatch=") + gains});
-    const Experiment e = assessed("srms_capture_doss", with(kAll, kAdapts), set);
+    const Experiment e = assessed("srms_capture_doss", with(kCompensated, kAdapts), set);
     EXPECT_EQ(e.controller.stability, Stability::kStable);
     const Series series = run(e);
     ASSERT_TRUE(result_.good());
@@ -229,7 +223,7 @@ TEST_F(Emulation, GainsThatAreFivePercentOffAreLearnt) {
 }
 
 TEST_F(Emulation, GateHoldsForAllThatMayBeLearnt) {
-  const Experiment e = experiment("srms_unberth_doss", with(kAll, kAdapts),
+  const Experiment e = experiment("srms_unberth_doss", with(kCompensated, kAdapts),
                                   with({"sensor.noise=false", "base.keep_modes=6"}, kMean));
   const Compensation& c = e.controller.compensation;
   const double most = 1.0 + c.adaptation_limit;  // what was learnt here, the machine there
@@ -262,8 +256,9 @@ TEST_F(Emulation, GateHoldsForAllThatMayBeLearnt) {
 
 TEST_F(Emulation, AnAidedWrenchKeepsTheNoiseOut) {  // of the sensor, in motions of a millimetre
   for (const char* configuration : {"unberth", "low_hover", "deploy", "capture"}) {
-    const Experiment e = experiment(std::string("srms_") + configuration + "_puma",
-                                    with(kAll, kAided), with({"base.keep_modes=6"}, kMean));
+    const Experiment e =
+        experiment(std::string("srms_") + configuration + "_puma", with(kCompensated, kAidedWrench),
+                   with({"base.keep_modes=6"}, kMean));
     const Series series = run(e);
     ASSERT_TRUE(result_.good()) << configuration;
     EXPECT_LT(share(e, series), 0.05) << configuration;
@@ -271,7 +266,7 @@ TEST_F(Emulation, AnAidedWrenchKeepsTheNoiseOut) {  // of the sensor, in motions
 }
 
 TEST_F(Emulation, WhatIsLearntGoesByTheTimesThatTheMachineEchoes) {
-  Rig rig(experiment("z_sine", with(kAll, kAdapts), {}));
+  Rig rig(experiment("z_sine", with(kCompensated, kAdapts), {}));
   const std::int64_t period = 10'000'000;  // [ns]
   rig.disturb([&](Sample& s) {             // it says that they came 2 ms later than they did
     s.command_tick = s.time / period - 1;
@@ -284,8 +279,8 @@ TEST_F(Emulation, WhatIsLearntGoesByTheTimesThatTheMachineEchoes) {
 }
 
 TEST_F(Emulation, AnAidedWrenchComesInAndGoesOutWithTheCompensation) {
-  Rig rig(
-      experiment("srms_low_hover_puma", with(kAll, kAided), with({"base.keep_modes=2"}, kMean)));
+  Rig rig(experiment("srms_low_hover_puma", with(kCompensated, kAidedWrench),
+                     with({"base.keep_modes=2"}, kMean)));
   const auto admitted = [](const TickState& s) { return s.kind == SegmentKind::kAdmittance; };
   rig.tick(Request::kStart);
   int withheld = 0, between = 0;
@@ -314,7 +309,7 @@ TEST_F(Emulation, AnAidedWrenchLetsAPushThatNoModelKnowsPass) {
         push ? ", faults: [{at_s: 2, duration_s: 0.1, fault: wrench_step, which: 3, counts: " +
                    std::to_string(counts) + "}]"
              : "";
-    const Series series = run(experiment("srms_low_hover_puma", with(kAll, more),
+    const Series series = run(experiment("srms_low_hover_puma", with(kCompensated, more),
                                          with({"base.keep_modes=6",
                                                "program=[{move: {}}, {calibration: {}}, "
                                                "{admittance: {duration_s: 8}" +
@@ -332,7 +327,7 @@ TEST_F(Emulation, AnAidedWrenchLetsAPushThatNoModelKnowsPass) {
       with_push[i] -= without[i];
     return with_push;
   };
-  const std::vector<Vec6> should = effect({"sensor.noise=false"}), is = effect(kAided);
+  const std::vector<Vec6> should = effect({"sensor.noise=false"}), is = effect(kAidedWrench);
   ASSERT_EQ(should.size(), is.size());
   double both = 0.0, all = 0.0;
   for (std::size_t i = 0; i < is.size(); ++i) {
@@ -357,7 +352,7 @@ TEST_F(Emulation, LoopModelKnowsTheCompensation) {
   for (const char* scenario : {"srms_deploy_doss", "srms_unberth_doss"})
     for (const double error : {0.5, 0.8, 1.2, 1.6, 2.0}) {
       const std::string what = std::string(scenario) + " " + std::to_string(error);
-      Experiment e = experiment(scenario, kAll,
+      Experiment e = experiment(scenario, kCompensated,
                                 {"base.keep_modes=6", "sensor.noise=false", "gravity_m_per_s2=0"});
       const Loop right =
           loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kSwinging);
@@ -394,7 +389,7 @@ TEST_F(Emulation, LoopModelKnowsAWrenchThatIsLaterThanBelieved) {
   for (const std::vector<std::string>& readings : {kPublished, kMean})
     for (const double late : {-3e-3, -2e-3, -1e-3, 1e-3, 2e-3, 3e-3}) {
       Experiment e =
-          experiment("puma_on_table_4_1", kAll, with(lightBase(5.0, 1.0, 0.01), readings));
+          experiment("puma_on_table_4_1", kCompensated, with(lightBase(5.0, 1.0, 0.01), readings));
       Loop loop = loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kSwinging);
       loop.late = late;
       const DominantRoot root = dominantRoot(loop);
@@ -421,7 +416,7 @@ TEST_F(Emulation, LoopModelKnowsAWrenchThatIsLaterThanBelieved) {
 
 TEST_F(Emulation, GateHoldsForWhatTheBeliefMayBeOffBy) {
   const std::vector<std::string> base = lightBase(5.0, 3.0, 0.02);
-  const Experiment e = assessed("puma_on_table_4_1", kAll, base);
+  const Experiment e = assessed("puma_on_table_4_1", kCompensated, base);
   EXPECT_EQ(e.controller.stability, Stability::kUnstable);
   const LoopVerdict v = assessStability(e.controller, e.plant);
   EXPECT_TRUE(v.as_believed);
@@ -429,7 +424,7 @@ TEST_F(Emulation, GateHoldsForWhatTheBeliefMayBeOffBy) {
   EXPECT_NE(explain(v).find("would decay as believed, but diverge with a wrench 0.5 ms earlier"),
             std::string::npos)
       << explain(v);
-  EXPECT_EQ(assessed("puma_on_table_4_1", kAll,
+  EXPECT_EQ(assessed("puma_on_table_4_1", kCompensated,
                      with(base, {"controller.compensation.timing_error_s=0",
                                  "controller.compensation.gain_error=0",
                                  "controller.compensation.mass_error=0"}))
@@ -439,7 +434,7 @@ TEST_F(Emulation, GateHoldsForWhatTheBeliefMayBeOffBy) {
   const std::vector<std::string> heavy = with(lightBase(5.0, 3.0, 0.02), kMean);
   const auto verdict = [&](const char* timing, const char* gain, const char* mass) {
     const std::string key = "controller.compensation.";
-    return assessed("puma_on_table_4_1", kAll,
+    return assessed("puma_on_table_4_1", kCompensated,
                     with(heavy, {key + "timing_error_s=" + timing, key + "gain_error=" + gain,
                                  key + "mass_error=" + mass}))
         .controller.stability;
@@ -453,8 +448,8 @@ TEST_F(Emulation, GateHoldsForWhatTheBeliefMayBeOffBy) {
 
 TEST_F(Emulation, ComesInWithoutABump) {
   // From arming on, held still: no leg leaves its place by more than a count while the share rises.
-  const Experiment e =
-      experiment("puma_on_table_4_1", kAll, {"program=[{calibration: {}}]", "initial_pose={}"});
+  const Experiment e = experiment("puma_on_table_4_1", kCompensated,
+                                  {"program=[{calibration: {}}]", "initial_pose={}"});
   const Series series = run(e);
   ASSERT_TRUE(result_.good());
   bool rising = false;
@@ -472,7 +467,7 @@ TEST_F(Emulation, GoesOutAndComesBackInTheMiddleOfASwing) {
   // slower direction at most: while that goes out and comes in over the ramp, it changes in a tick
   // by its own rate, and by the ramp's share of it.
   const Experiment e = experiment(
-      "puma_on_table_4_1", kAll,
+      "puma_on_table_4_1", kCompensated,
       {"gravity_m_per_s2=0", "sensor.noise=false",
        "program=[{move: {}}, {calibration: {}}, {move: {to: {x_m: 0.05, z_m: 0.04}}}, {admittance: "
        "{duration_s: 8}}]"});
@@ -508,7 +503,7 @@ TEST_F(Emulation, GoesOutAndComesBackInTheMiddleOfASwing) {
 }
 
 TEST_F(Emulation, IsNotTakenOutOfALoopThatNeedsIt) {
-  const Experiment e = assessed("srms_deploy_doss", kAll, {"base.keep_modes=6"});
+  const Experiment e = assessed("srms_deploy_doss", kCompensated, {"base.keep_modes=6"});
   EXPECT_EQ(e.controller.stability, Stability::kStable);
   EXPECT_EQ(e.controller.stability_uncompensated, Stability::kUnstable);
   bool asked = false, refused = false;
@@ -524,7 +519,7 @@ TEST_F(Emulation, IsNotTakenOutOfALoopThatNeedsIt) {
 
 TEST_F(Emulation, StuckValveStopsIt) {
   const Experiment e = experiment(
-      "z_sine", kAll,
+      "z_sine", kCompensated,
       {"program=[{trajectory: {duration_s: 3, z: {sine: {amplitude_m: 0.2, frequency_hz: 0.5}}}, "
        "faults: [{at_s: 1.0, duration_s: 5, fault: valve_stuck, which: 3}]}]"});
   const RunResult result = runLockstep(e, nullptr, nullptr);
@@ -534,7 +529,7 @@ TEST_F(Emulation, StuckValveStopsIt) {
 
 TEST_F(Emulation, StopEndsWhereTheLegsWereTold) {  // a freeze in the middle of a fast motion
   const Experiment e = experiment(
-      "z_sine", kAll,
+      "z_sine", kCompensated,
       {"program=[{trajectory: {duration_s: 3, z: {sine: {amplitude_m: 0.2, frequency_hz: 0.5}}}, "
        "faults: [{at_s: 2.0, duration_s: 5, fault: panic_button}]}]"});
   const Series series = run(e);

@@ -15,7 +15,7 @@
 namespace ves {
 namespace {
 
-constexpr double kMass = 100.0, kSpeed = 0.02;  // [kg], [m/s] of the target
+constexpr double kTargetMass = 100.0, kSpeed = 0.02;  // [kg], [m/s] of the target
 
 /// The PUMA in space, a ball of 0.3 m drifting along -x against its tool, 5 mm before it touches.
 Experiment meeting(double stiffness, const std::string& contact = "",
@@ -25,7 +25,7 @@ Experiment meeting(double stiffness, const std::string& contact = "",
       fmt::format("environment={{tool: [{{radius_m: 0.02}}], contact: {{stiffness: {}{}}}, target: "
                   "{{mass_kg: {}, from_tool_m: [0.325, 0, 0], velocity_m_per_s: [{}, 0, 0], ball: "
                   "{{radius_m: 0.3}}}}}}",
-                  stiffness, contact, kMass, -kSpeed)};
+                  stiffness, contact, kTargetMass, -kSpeed)};
   set.insert(set.end(), more.begin(), more.end());
   return test::experiment("puma_on_table_4_1", set);
 }
@@ -42,7 +42,7 @@ TEST(ContactInThePlant, ATargetReboundsFromAToolThatIsHeld) {
     const Experiment e = meeting(k);
     plant::Plant plant = alone(e);
     const Vec3 held = plant.truth().P.X.p;
-    const double omega = std::sqrt(k / kMass);
+    const double omega = std::sqrt(k / kTargetMass);
     double peak = 0.0, impulse = 0.0, touched = 0.0, felt = 0.0;
     constexpr double dt = 1e-3;
     for (int i = 1; i <= 2000; ++i) {
@@ -58,9 +58,9 @@ TEST(ContactInThePlant, ATargetReboundsFromAToolThatIsHeld) {
     }
     const plant::Truth& t = plant.truth();
     EXPECT_NEAR(t.target.v.x(), kSpeed, 0.01 * kSpeed) << k;
-    EXPECT_NEAR(peak, kSpeed * std::sqrt(k * kMass), 0.01 * peak) << k;
+    EXPECT_NEAR(peak, kSpeed * std::sqrt(k * kTargetMass), 0.01 * peak) << k;
     EXPECT_NEAR(touched, M_PI / omega, 0.01 * M_PI / omega + 2.0 * dt) << k;
-    EXPECT_NEAR(impulse, 2.0 * kMass * kSpeed, 0.02 * impulse) << k;
+    EXPECT_NEAR(impulse, 2.0 * kTargetMass * kSpeed, 0.02 * impulse) << k;
     EXPECT_NEAR(felt, peak, 0.05 * peak)
         << k;  // by the sensor's platform, and the robot's own shake
     EXPECT_GT(t.clearance, 0.0);
@@ -216,7 +216,7 @@ TEST(ContactInFreeSpace, TwoMassesPartAsTheyMet) {
   const double k = 1e4, base = 400.0;
   const Interaction i = afloat(meeting(k), base, 1e12);
   const double carried = compositeBody(ves::carried(i.payload), i.q0).mass, M = base + carried,
-               mu = M * kMass / (M + kMass);
+               mu = M * kTargetMass / (M + kTargetMass);
   InteractionOptions options;
   options.model = InteractionModel::kWhole;
   options.duration = 2'000'000'000;
@@ -227,8 +227,8 @@ TEST(ContactInFreeSpace, TwoMassesPartAsTheyMet) {
     if (p.touch.least < 0.0) touched += 1e-3;
     peak = std::max(peak, p.touch.on_tool_To_I.f.norm());
   }
-  EXPECT_NEAR(points.back().target.v.x(), -kSpeed * (kMass - M) / (kMass + M), 1e-7);
-  EXPECT_NEAR(points.back().x_dot.x(), -kSpeed * 2.0 * kMass / (kMass + M), 1e-7);
+  EXPECT_NEAR(points.back().target.v.x(), -kSpeed * (kTargetMass - M) / (kTargetMass + M), 1e-7);
+  EXPECT_NEAR(points.back().x_dot.x(), -kSpeed * 2.0 * kTargetMass / (kTargetMass + M), 1e-7);
   EXPECT_NEAR(touched, M_PI * std::sqrt(mu / k), 2e-3);
   EXPECT_NEAR(peak, kSpeed * std::sqrt(k * mu), 1e-4 * peak);
 }
@@ -335,7 +335,7 @@ TEST(ContactInFreeSpace, EventsAreLocated) {
   const double k = 1e4, base = 400.0;
   const Interaction i = afloat(meeting(k), base, 1e12);
   const double M = base + compositeBody(ves::carried(i.payload), i.q0).mass,
-               mu = M * kMass / (M + kMass);
+               mu = M * kTargetMass / (M + kTargetMass);
   InteractionOptions options;
   options.model = InteractionModel::kWhole;
   options.duration = 1'500'000'000;
@@ -374,8 +374,8 @@ TEST(ContactInFreeSpace, WhatIsGraspedGoesAlong) {
   const std::vector<InteractionPoint> points = simulate(i, options);
   const double M = 400.0 + compositeBody(ves::carried(i.payload), i.q0).mass;
   for (const InteractionPoint& p : points)
-    EXPECT_NEAR(M * p.x_dot.x() + kMass * p.target.v.x(), -kMass * kSpeed, 1e-9) << p.t;
-  const double together = -kMass * kSpeed / (M + kMass);
+    EXPECT_NEAR(M * p.x_dot.x() + kTargetMass * p.target.v.x(), -kTargetMass * kSpeed, 1e-9) << p.t;
+  const double together = -kTargetMass * kSpeed / (M + kTargetMass);
   for (const double t : {2.5, 3.5}) {  // held, and let go
     const InteractionPoint& p = points[static_cast<std::size_t>(std::lround(t / 0.01))];
     EXPECT_EQ(p.target.X_TB.has_value(), t < 3.0);

@@ -3,7 +3,6 @@
 
 #include <Eigen/LU>
 #include <kdl/chainfksolverpos_recursive.hpp>
-#include <limits>
 #include <random>
 
 #include "support/poses.hpp"
@@ -18,7 +17,6 @@
 namespace ves {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kT = 0.01;  // [s]
 
 using test::experiment;

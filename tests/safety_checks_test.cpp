@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/SVD>
-#include <limits>
 #include <random>
 
 #include "support/poses.hpp"
@@ -16,9 +15,9 @@ namespace ves {
 namespace {
 
 constexpr double kT = 0.01;  // [s]
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 using test::experiment;
+using test::kNan;
 
 class SafetyChecks : public testing::Test {
  protected:

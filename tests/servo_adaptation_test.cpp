@@ -13,8 +13,9 @@
 namespace ves {
 namespace {
 
-constexpr double kPeriod = 0.01;            // [s]
-constexpr std::int64_t kTick = 10'000'000;  // [ns]
+using test::kTick;
+
+constexpr double kPeriod = 0.01;  // [s]
 const AdaptationSettings kSettings = {0.05, 5e-4, 1.5, 60.0};
 
 /// A leg of the machine that swings, and what is learnt of it. All six readings are of this leg.

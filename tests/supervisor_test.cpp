@@ -3,8 +3,6 @@
 // The phases of testPlatform: what an order, the end of a segment or a failing check leads to.
 #include <gtest/gtest.h>
 
-#include <limits>
-
 #include "support/rig.hpp"
 #include "ves/control/supervisor.hpp"
 
@@ -12,20 +10,9 @@ namespace ves {
 namespace {
 
 using test::experiment;
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-
-Sample numbered(std::int64_t sequence) {
-  Sample s;
-  s.sequence = sequence;
-  s.time = s.legs_time = s.wrench_time = s.joints_time = sequence * 10'000'000;
-  return s;
-}
-
-const ControllerConfig& puma() {
-  static const ControllerConfig config = experiment("puma_on_table_4_1").controller;
-  return config;
-}
+using test::kNan;
+using test::numbered;
+using test::puma;
 
 /// A supervisor with everything around it.
 struct Desk {

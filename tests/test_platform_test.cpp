@@ -11,9 +11,8 @@
 namespace ves {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-
 using test::experiment;
+using test::kNan;
 
 /// A controller on a machine that goes exactly where it is told, at once.
 class Bench {

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 
 #include "support/rig.hpp"
 #include "ves/control/robot_load.hpp"
@@ -16,13 +15,9 @@ namespace ves {
 namespace {
 
 using test::experiment;
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-
-const ControllerConfig& puma() {
-  static const ControllerConfig config = experiment("puma_on_table_4_1").controller;
-  return config;
-}
+using test::kNan;
+using test::numbered;
+using test::puma;
 
 // Clock and samples
 
@@ -47,13 +42,6 @@ TEST(TickClock, IdleTicksMayBePassedOverAndAreNotMissed) {
   EXPECT_EQ(clock.update(20).missed, 2);  // and two more are late
   EXPECT_EQ(clock.update(21).missed, 0);  // real time passes over none
   EXPECT_EQ(clock.update(24).missed, 2);
-}
-
-Sample numbered(std::int64_t sequence) {
-  Sample s;
-  s.sequence = sequence;
-  s.time = s.legs_time = s.wrench_time = s.joints_time = sequence * 10'000'000;
-  return s;
 }
 
 TEST(SampleStream, AgesUntilANewSampleComes) {

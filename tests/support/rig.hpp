@@ -3,7 +3,9 @@
 // Controller and plant in lockstep under a test's hands.
 #pragma once
 
+#include <cstdint>
 #include <functional>
+#include <limits>
 
 #include "support/robots.hpp"
 #include "ves/config/experiment.hpp"
@@ -11,9 +13,18 @@
 
 namespace ves::test {
 
+inline constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+inline constexpr std::int64_t kTick = 10'000'000;  // [ns]
+
+inline const std::vector<std::string> kCompensated = {"controller.compensation.feed_forward=true",
+                                                      "controller.compensation.observer=true",
+                                                      "controller.compensation.inertia=true"};
+
 /// A scenario whose admittance control begins whatever the stability check would say: that takes
 /// a tenth of a second, and few tests are about it.
-inline Experiment experiment(const std::string& name, std::vector<std::string> set = {}) {
+inline Experiment experiment(const std::string& name, std::vector<std::string> set = {},
+                             const std::vector<std::string>& more = {}) {
+  set.insert(set.end(), more.begin(), more.end());
   set.insert(set.begin(),
              {"controller.stability=forced", "controller.stability_uncompensated=forced"});
   return loadExperiment(configDir() + "/scenarios/" + name + ".yaml", set);
@@ -22,6 +33,19 @@ inline Experiment experiment(const std::string& name, std::vector<std::string> s
 /// The same as a person loads it: nobody has looked yet.
 inline Experiment unassessed(const std::string& name, const std::vector<std::string>& set = {}) {
   return loadExperiment(configDir() + "/scenarios/" + name + ".yaml", set);
+}
+
+inline const ControllerConfig& puma() {
+  static const ControllerConfig config = experiment("puma_on_table_4_1").controller;
+  return config;
+}
+
+/// A sample of the machine's that came in time.
+inline Sample numbered(std::int64_t sequence) {
+  Sample s;
+  s.sequence = sequence;
+  s.time = s.legs_time = s.wrench_time = s.joints_time = sequence * kTick;
+  return s;
 }
 
 inline Segment segment(SegmentKind kind, double duration = 0.0) {
