@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -14,6 +13,7 @@
 #include "ves/config/masses.hpp"
 #include "ves/config/servo.hpp"
 #include "ves/control/gravity_compensation.hpp"
+#include "ves/math/dense.hpp"
 #include "ves/plant/nominal_servo.hpp"
 
 namespace ves {
@@ -102,7 +102,7 @@ Experiment build(const Value& document) {
     bus.finish();
   }
   const Sensor sensor = readSensor(root.section("sensor"));
-  c.sensor = {sensor.model.S_proc().inverse(), sensor.X_PS};
+  c.sensor = {inverse(sensor.model.S_proc()), sensor.X_PS};
   c.stillness.bias /= sensor.model.volts_per_count;
   c.servo = plant::nominalServo(legs.gains, legs.actuator, legs.transducer);
   c.servo.sensor_cutoff = sensor.model.cutoff;

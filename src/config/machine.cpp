@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/LU>
+#include "ves/math/dense.hpp"
 
 namespace ves {
 
@@ -69,7 +69,7 @@ Sensor readSensor(Section s) {
   out.climate.period = climate.number("period_h", 1e-3, 1e5) * kHour;
   out.climate.rising = climate.number("rising_h", -1e5, 1e5) * kHour;
   climate.finish();
-  if (!(std::abs(m.S_proc().determinant()) > 0.0) || !m.S_proc().inverse().allFinite())
+  if (!inverse(m.S_proc()).allFinite())
     s.fail("sensitivity_uv_per_v", "is singular, want a matrix that has an inverse");
   out.X_PS = {Vec3(1.0, -1.0, -1.0).asDiagonal().toDenseMatrix(),  // 180 degrees about x
               s.vector("position_m", 3, -10.0, 10.0)};

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/control/aided_wrench.hpp"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
+#include "ves/math/dense.hpp"
 #include "ves/robot/newton_euler.hpp"
 
 namespace ves {
@@ -120,7 +120,7 @@ AidedWrench::AidedWrench(const ControllerConfig& config)
       speed_of_count_(config.servo.extend.cwiseMax(config.servo.retract)
                           .cwiseProduct(config.servo.readings.scale)),
       X_SP_(inverse(config.sensor.X_PS)),
-      S_proc_(config.sensor.C_proc.inverse()),
+      S_proc_(inverse(config.sensor.C_proc)),
       joints_(config),
       gate_(config) {}
 

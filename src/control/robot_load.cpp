@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/control/robot_load.hpp"
 
-#include <Eigen/LU>
-
 #include "ves/control/gravity_compensation.hpp"
+#include "ves/math/dense.hpp"
 
 namespace ves {
 
@@ -38,7 +37,7 @@ void KnownPayload::take(const ToldLoad& load) noexcept {
 
 StaticLoad::StaticLoad(const ControllerConfig& config)
     : gravity_(config.gravity),
-      S_proc_(config.sensor.C_proc.inverse()),
+      S_proc_(inverse(config.sensor.C_proc)),
       filters_(config.compensation.inertia),
       filter_(config.servo.sensor_cutoff),
       averages_(config.servo.sensor_window > 0.0) {}

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 #include <gsl/gsl_linalg.h>
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <memory>

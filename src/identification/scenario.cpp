@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "ves/config/urdf.hpp"
+#include "ves/math/dense.hpp"
 
 namespace ves {
 namespace {
@@ -23,7 +24,7 @@ constexpr double kApproach = 1.0;  // [s]
 StaticSetup staticSetup(const ControllerConfig& controller) {
   const Payload& payload = controller.payload;
   return {carried(payload), inverse(payload.X_PS) * payload.X_PL0(), payload.X_PS.R,
-          controller.sensor.C_proc.inverse(), controller.gravity};
+          inverse(controller.sensor.C_proc), controller.gravity};
 }
 
 std::string scenarioOf(const PosePlan& plan, const Experiment& experiment, const std::string& name,

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/identification/servo_identification.hpp"
 
-#include <Eigen/Cholesky>
 #include <array>
 #include <cmath>
 #include <stdexcept>
+
+#include "ves/math/dense.hpp"
 
 namespace ves {
 namespace {
@@ -70,21 +71,21 @@ ServoEstimate fit(const ServoModel& nominal, double period, double phase, const 
       // In units of the parameters' own size, so that conditioning means something.
       const Parameters size(nominal.extend(leg), nominal.retract(leg), nominal.tau(leg), 1e-3);
       const Eigen::Matrix4d scaled = size.asDiagonal() * JJ * size.asDiagonal();
-      const Eigen::LLT<Eigen::Matrix4d> llt(scaled);
-      if (llt.info() != Eigen::Success || !(llt.rcond() > 1e-9))
+      const Eigen::VectorXd eigenvalues = symmetricEigenvalues(scaled);
+      if (!(eigenvalues(0) > 1e-9 * eigenvalues(3)))
         throw std::domain_error("leg " + std::to_string(leg + 1) +
                                 " moves too little to tell gains, lag and delay apart");
       out.residual(leg) = std::sqrt(squares / static_cast<double>(n));
       if (turn == kTurns) {
         const Eigen::Matrix4d covariance = size.asDiagonal() *
-                                           llt.solve(Eigen::Matrix4d::Identity()) *
+                                           solvePositive(scaled, Eigen::Matrix4d::Identity()) *
                                            size.asDiagonal() * squares / static_cast<double>(n - 4);
         for (std::size_t p = 0; p < 4; ++p)
           (out.deviation.*kParameters[p])(leg) =
               std::sqrt(covariance(static_cast<Eigen::Index>(p), static_cast<Eigen::Index>(p)));
         continue;
       }
-      const Parameters change = size.asDiagonal() * llt.solve(size.asDiagonal() * Je);
+      const Parameters change = size.asDiagonal() * solvePositive(scaled, size.asDiagonal() * Je);
       for (std::size_t p = 0; p < 4; ++p)
         (out.servo.*kParameters[p])(leg) += change(static_cast<Eigen::Index>(p));
       out.servo.tau(leg) = std::max(kLeastTau, out.servo.tau(leg));

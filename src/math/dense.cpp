@@ -11,6 +11,8 @@ namespace ves {
 
 using Eigen::MatrixXd;
 
+Mat6 inverse(const Mat6& A) { return A.inverse(); }
+
 Eigen::VectorXcd eigenvalues(const MatrixXd& A) {
   return Eigen::EigenSolver<MatrixXd>(A, false).eigenvalues();
 }

@@ -4,14 +4,14 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/LU>
+#include "ves/math/dense.hpp"
 
 namespace ves::plant {
 
 ForceTorqueSensor::ForceTorqueSensor(const ForceTorqueSensorModel& model, Noise noise) noexcept
     : model_(model),
       volts_per_newton_(model.S_proc() * model.volts_per_count),
-      newtons_per_volt_(volts_per_newton_.inverse()),
+      newtons_per_volt_(inverse(volts_per_newton_)),
       noise_gain_((model.gain.cwiseProduct(model.noise)).array()),
       noisy_(!model.noise.isZero(0.0)),
       filter_(model.cutoff),

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/srms/arm.hpp"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -63,7 +62,7 @@ Mat6 tipCompliance(const ArmModel& arm) {
 }
 
 Vec6 masslessFrequencies(const ArmModel& arm, const RigidBody& payload_P) {
-  const Mat6 K = tipCompliance(arm).inverse();
+  const Mat6 K = inverse(tipCompliance(arm));
   return eigenmodes(spatialMass(payload_P), 0.5 * (K + K.transpose())).stiffness.cwiseSqrt() /
          (2.0 * M_PI);
 }

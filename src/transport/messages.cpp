@@ -5,12 +5,12 @@
 
 #include <unistd.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <random>
 
+#include "ves/math/dense.hpp"
 #include "ves/simulation/lockstep.hpp"
 
 namespace ves {
@@ -382,8 +382,7 @@ std::optional<RobotOrder> handOrder(const robot_command_t& m) noexcept {
   for (const double x : m.com) good = good && inRange(x, -kMaxReach, kMaxReach);
   for (const double x : m.inertia) good = good && inRange(x, -kMaxLoadInertia, kMaxLoadInertia);
   if (!good) return {};
-  const Eigen::SelfAdjointEigenSolver<Mat3> principal(body.I_Bcm_B, Eigen::EigenvaluesOnly);
-  if (!(principal.eigenvalues()(0) >= -1e-9 * body.I_Bcm_B.norm())) return {};
+  if (!(symmetricEigenvalues(body.I_Bcm_B)(0) >= -1e-9 * body.I_Bcm_B.norm())) return {};
   return HandOrder{body};
 }
 

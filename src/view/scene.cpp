@@ -32,7 +32,8 @@ constexpr double kJointRadius = 0.55;  // [m]
 
 /// Axes whose z points along a leg; how they are turned about it does not matter.
 Mat3 along(const Vec3& way) {
-  return Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), way).toRotationMatrix();
+  const Vec3 z = way.normalized(), x = z.unitOrthogonal();
+  return (Mat3() << x, z.cross(x), z).finished();
 }
 
 Json capsule(const std::string& frame, const Vec3& from, const Vec3& to, double radius) {

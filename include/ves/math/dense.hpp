@@ -6,7 +6,12 @@
 #include <Eigen/Core>
 #include <complex>
 
+#include "ves/math/frames.hpp"
+
 namespace ves {
+
+/// Not finite where A has none.
+Mat6 inverse(const Mat6& A);
 
 /// Of a square matrix, in no order.
 Eigen::VectorXcd eigenvalues(const Eigen::MatrixXd& A);
