@@ -117,8 +117,9 @@ MatrixXd throughPeriod(double period, std::vector<Event> events, const MatrixXd&
 
 /// z = {mechanics, v_end, the first reading of the pair to come, X(k-1) .. X(k-4), the converter's
 /// sum, and of a contact {place, speed of what it leans on, sensor (2), the converter's sum}},
-/// without what nothing reads: Filter 3 where it is absent, the earlier readings where there is no
-/// derivative gain, the sums where the converter is read once.
+/// without what nothing reads after the tick: the first reading, which is new before the pair's
+/// second; Filter 3 where it is absent, the earlier readings where there is no derivative gain, the
+/// sums where the converter is read once.
 Channel channelOf(const Loop& loop, const std::optional<Leaning>& contact, MatrixXd* places) {
   using plant::kTransducerPeriod, plant::kUpdatePeriod;
   constexpr Index kHeld = Mechanics::kSize, kFirst = kHeld + 1, kHistory = kFirst + 1,
@@ -192,9 +193,9 @@ Channel channelOf(const Loop& loop, const std::optional<Leaning>& contact, Matri
   for (Index i = 0; i < kSize; ++i) {
     const bool filter = i >= Mechanics::kFilter && i < Mechanics::kSensor,
                history = i >= kHistory && i < kSum, sum = i == kSum || i == kForceSum;
-    if ((!filter || loop.filter_cutoff > 0.0) && (!history || loop.derivative_gain > 0.0) &&
-        (!sum || loop.readings > 1) && (i < kOther || contact) &&
-        (i < kOther || i >= kForce || contact->inverse_mass > 0.0))
+    if (i != kFirst && (!filter || loop.filter_cutoff > 0.0) &&
+        (!history || loop.derivative_gain > 0.0) && (!sum || loop.readings > 1) &&
+        (i < kOther || contact) && (i < kOther || i >= kForce || contact->inverse_mass > 0.0))
       kept.push_back(i);
   }
   if (places) {
@@ -205,10 +206,10 @@ Channel channelOf(const Loop& loop, const std::optional<Leaning>& contact, Matri
   return {all(kept, kept), all(kept, kCommand), felt(kept), pressed(kept)};
 }
 
-/// The controller's servo model of one direction. z = {length, speed, v_end, sensor (2), where a
-/// delay is believed the command before, where the readings are averaged the filtered speed of the
-/// tick before}; a reading replaces the length at every tick.
-Channel observerOf(const Loop& loop) {
+/// The controller's servo model of one direction. z = {speed, v_end, sensor (2), where a delay is
+/// believed the command before, where the readings are averaged the filtered speed of the tick
+/// before}; a reading replaces the length at every tick.
+Observer observerOf(const Loop& loop) {
   constexpr Index kLength = 0, kSpeed = 1, kHeld = 2, kSensor = 3, kBefore = 5, kMean = 6,
                   kSize = 7, kCommand = kSize;
   const ServoModel& servo = loop.model.servo;
@@ -261,8 +262,8 @@ Channel observerOf(const Loop& loop) {
   const MatrixXd all = throughPeriod(loop.period, events, generator);
   std::vector<Index> kept;
   for (Index i = 0; i < kSize; ++i)
-    if ((i != kBefore || waits) && (i != kMean || averages)) kept.push_back(i);
-  return {all(kept, kept), all(kept, kCommand), felt(kept), {}};
+    if (i != kLength && (i != kBefore || waits) && (i != kMean || averages)) kept.push_back(i);
+  return {{all(kept, kept), all(kept, kCommand), felt(kept), {}}, all(kept, kLength)};
 }
 
 }  // namespace ves

@@ -10,16 +10,16 @@
 
 namespace ves {
 
-/// One direction over a controller period: z <- step z + from_command u; the first of z is the
-/// length. `felt` z is the acceleration as the wrench shows it at the tick, `pressed` z the same of
-/// the force that it leans with.
+/// One direction over a controller period: z <- step z + from_command u. `felt` z is the
+/// acceleration as the wrench shows it at the tick, `pressed` z the same of the force that it leans
+/// with.
 struct Channel {
   Eigen::MatrixXd step;
   Eigen::VectorXd from_command;
   Eigen::RowVectorXd felt, pressed;
 };
 
-/// States of every channel that the loop looks at.
+/// States of the machine's channel that the loop looks at.
 struct ChannelState {
   static constexpr Eigen::Index kLength = 0, kSpeed = 1;  // [m], [m/s]
 };
@@ -29,7 +29,10 @@ struct ChannelState {
 Channel channelOf(const Loop& loop, const std::optional<Leaning>& contact,
                   Eigen::MatrixXd* places = nullptr);
 
-/// The controller's servo model, of which a reading replaces the length at every tick.
-Channel observerOf(const Loop& loop);
+/// The controller's servo model, which a reading of the length corrects at every tick.
+struct Observer : Channel {
+  Eigen::VectorXd from_length;
+};
+Observer observerOf(const Loop& loop);
 
 }  // namespace ves

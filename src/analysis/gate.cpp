@@ -108,14 +108,16 @@ std::optional<std::array<int, 3>> cornerThatGrows(const ControllerConfig& contro
   const Compensation& c = controller.compensation;
   if (!c.inertia) return {};
   const Uncertainty by = uncertaintyOf(c);
-  for (const int mass : {1, -1}) {
-    std::vector<CarriedRobot> others = robots;
-    for (CarriedRobot& robot : others) robot.robot_P = heavier(1.0 + mass * by.mass, robot.robot_P);
-    for (const int gain : {1, -1})
-      for (const int timing : {1, -1})
-        if (!holds(controller, plant, others, [&](Loop& l) { l = off(l, by, timing, gain); }))
-          return std::array<int, 3>{timing, gain, mass};
-  }
+  std::vector<CarriedRobot> heavy = robots, both = robots;
+  for (CarriedRobot& robot : heavy) robot.robot_P = heavier(1.0 + by.mass, robot.robot_P);
+  for (CarriedRobot& robot : both) robot.robot_P = heavier(1.0 - by.mass, robot.robot_P);
+  both.insert(both.end(), heavy.begin(), heavy.end());
+  for (const int gain : {1, -1})
+    for (const int timing : {1, -1}) {
+      const auto change = [&](Loop& l) { l = off(l, by, timing, gain); };
+      if (!holds(controller, plant, both, change))
+        return std::array<int, 3>{timing, gain, holds(controller, plant, heavy, change) ? -1 : 1};
+    }
   return {};
 }
 

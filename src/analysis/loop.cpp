@@ -35,7 +35,7 @@ Mat6 axesAlong(const Vec6& d) {
 struct Lifted {
   Channel channel;
   Channel leaning;               // where there is a contact
-  Channel model;                 // where the inertia is taken out
+  Observer model;                // where the inertia is taken out
   Mat6 axes = Mat6::Identity();  // of the channels, which are equal; the first along the contact
 };
 
@@ -55,7 +55,7 @@ Lifted liftedOf(const Loop& loop) {
 MatrixXd systemOf(const Loop& loop, const Lifted& lifted, const Vec6* pushed = nullptr,
                   RowVectorXd* first_command = nullptr) {
   const Loop::Model& own = loop.model;
-  const Channel& model = lifted.model;
+  const Observer& model = lifted.model;
   const auto channel = [&](Index i) -> const Channel& {
     return i == 0 && loop.contact ? lifted.leaning : lifted.channel;
   };
@@ -123,8 +123,8 @@ MatrixXd systemOf(const Loop& loop, const Lifted& lifted, const Vec6* pushed = n
     if (!own.inertia) continue;
     const Index own_at = models + i * m;
     S.middleRows(own_at, m) = model.from_command * command.row(i);
-    S.block(own_at, own_at + 1, m, m - 1) += model.step.rightCols(m - 1);
-    S.col(at + ChannelState::kLength).segment(own_at, m) += model.step.col(0);  // as read
+    S.block(own_at, own_at, m, m) += model.step;
+    S.col(at + ChannelState::kLength).segment(own_at, m) += model.from_length;
   }
   return S;
 }
