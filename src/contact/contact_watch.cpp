@@ -5,6 +5,19 @@
 
 namespace ves {
 
+double ContactWatch::closedAt(double t) const noexcept {
+  Place after{t, 0.0};
+  const std::size_t known = std::min(places_, before_.size());
+  for (std::size_t i = 1; i <= known; ++i) {
+    const Place& place = before_[(places_ - i) % before_.size()];
+    const double then = t - kMean;
+    if (place.t <= then)
+      return (place.gap + (after.gap - place.gap) * (then - place.t) / (after.t - place.t)) / kMean;
+    after = place;
+  }
+  return after.t < t ? after.gap / (t - after.t) : 0.0;
+}
+
 void ContactWatch::see(double t, const Touch& now) noexcept {
   const bool touches = now.least < 0.0, known = std::isfinite(gap_);
   // A share of the time since the last look after which the gap was zero.
@@ -16,10 +29,8 @@ void ContactWatch::see(double t, const Touch& now) noexcept {
     ++count_;
     contact_ = {};
     contact_.began = changed;
-    // Since the older of the two places that are known; where there is none yet, as it is now.
-    contact_.approach = earlier_.gap > 0.0 && std::isfinite(earlier_.gap)
-                            ? earlier_.gap / (changed - earlier_.t)
-                            : now.closing;
+    const double closed = closedAt(changed);
+    contact_.approach = closed > 0.0 && std::isfinite(closed) ? closed : now.closing;
     contact_.impulse = 0.5 * (t - changed) * now.pressed;
   } else if (touching_) {
     contact_.impulse += 0.5 * ((touches ? t : changed) - t_) * (force_ + now.pressed);
@@ -28,16 +39,17 @@ void ContactWatch::see(double t, const Touch& now) noexcept {
   if (touches) contact_.peak = std::max(contact_.peak, now.pressed.norm());
   if (touching_ && !touches) {
     parted_ = changed;
-    earlier_ = later_ = {changed, 0.0};
+    before_[0] = {changed, 0.0};
+    places_ = 1;
   }
   if (parted_ >= 0.0 && t - parted_ >= kMean) {
-    contact_.separation = now.least / (t - parted_);
+    const double then = parted_ + kMean, from = std::max(t_, parted_),
+                 gap = touching_ ? 0.0 : gap_;  // at `from`
+    contact_.separation = (gap + (now.least - gap) * (then - from) / (t - from)) / kMean;
     parted_ = -1.0;
   }
-  if (!touches && t - later_.t >= kMean) {
-    earlier_ = later_;
-    later_ = {t, now.least};
-  }
+  if (!touches && (places_ == 0 || t - before_[(places_ - 1) % before_.size()].t >= kApart))
+    before_[places_++ % before_.size()] = {t, now.least};
   touching_ = touches;
   t_ = t;
   gap_ = now.least;

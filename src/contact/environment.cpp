@@ -64,21 +64,56 @@ Floating moved(const Floating& from, const FloatingRates& by, double dt) {
   return out;
 }
 
-/// Between two motions, a share s of dt after the first: a cubic for the place, the turn even.
-FrameMotion between(const FrameMotion& a, const FrameMotion& b, double dt, double s) {
-  const double s2 = s * s, s3 = s2 * s;
-  FrameMotion out;
-  out.X.p = (2.0 * s3 - 3.0 * s2 + 1.0) * a.X.p + (s3 - 2.0 * s2 + s) * dt * a.v +
-            (3.0 * s2 - 2.0 * s3) * b.X.p + (s3 - s2) * dt * b.v;
-  out.v = (6.0 * s2 - 6.0 * s) / dt * (a.X.p - b.X.p) + (3.0 * s2 - 4.0 * s + 1.0) * a.v +
-          (3.0 * s2 - 2.0 * s) * b.v;
-  const Eigen::Quaterniond from(a.X.R), to(b.X.R);
-  out.X.R = from.slerp(s, to).toRotationMatrix();
-  out.w = a.w + s * (b.w - a.w);
-  return out;
+/// From one motion to another over dt: a cubic for the place, the turn even.
+class Passage {
+ public:
+  Passage(const FrameMotion& a, const FrameMotion& b, double dt)
+      : a_(a), b_(b), dt_(dt), from_(a.X.R), to_(b.X.R) {}
+
+  /// A share s of dt after the first, 0 <= s <= 1.
+  FrameMotion at(double s) const {
+    const double s2 = s * s, s3 = s2 * s;
+    FrameMotion out;
+    out.X.p = (2.0 * s3 - 3.0 * s2 + 1.0) * a_.X.p + (s3 - 2.0 * s2 + s) * dt_ * a_.v +
+              (3.0 * s2 - 2.0 * s3) * b_.X.p + (s3 - s2) * dt_ * b_.v;
+    out.v = (6.0 * s2 - 6.0 * s) / dt_ * (a_.X.p - b_.X.p) + (3.0 * s2 - 4.0 * s + 1.0) * a_.v +
+            (3.0 * s2 - 2.0 * s) * b_.v;
+    out.X.R = from_.slerp(s, to_).toRotationMatrix();
+    out.w = a_.w + s * (b_.w - a_.w);
+    return out;
+  }
+
+ private:
+  const FrameMotion &a_, &b_;
+  double dt_;
+  Eigen::Quaterniond from_, to_;
+};
+
+/// What the gap of the tool to anything may shrink by over dt [m], and more.
+double mayShrink(const Environment& environment, const FrameMotion& from, const FrameMotion& to,
+                 const Floating& target, double dt) {
+  constexpr double kMore = 2.0, kLeast = 1e-5;  // [-], [m]
+  double arm = 0.0;
+  for (const Feeler& feeler : environment.tool) arm = std::max(arm, feeler.p_TQ_T.norm());
+  const double tool = std::max(from.v.norm(), to.v.norm()) +
+                      std::max(from.w.norm(), to.w.norm()) * arm,
+               floats = target.v.norm() + target.w.norm() * ((from.X.p - target.p).norm() + arm) +
+                        environment.gravity.norm() * dt;
+  return kMore * dt * (tool + floats) + kLeast;
 }
 
-constexpr double kMostAlone = 2e-3;  // [s]
+/// How long a step may be while nothing touches [s]: what is held swings on the grip's springs.
+double smoothStep(const Environment& environment, const Floating& target) {
+  constexpr double kLongest = 2e-3;  // [s]
+  constexpr double kTurn = 0.05;     // [rad] of the quickest swing
+  if (!target.X_TB) return kLongest;
+  const Grip& grip = *environment.grip;
+  const double m_1 = 1.0 / environment.target->mass,
+               I_1 = environment.target->I_Bcm_B.inverse().norm();  // the least, or more
+  const double quickest = std::max({std::sqrt(grip.stiffness * m_1), grip.damping * m_1,
+                                    std::sqrt(grip.turn_stiffness * I_1), grip.turn_damping * I_1});
+  return std::min(kLongest, kTurn / quickest);
+}
 
 }  // namespace
 
@@ -118,7 +153,7 @@ FloatingRates rates(const Environment& environment, const Floating& target,
   const Target& body = *environment.target;
   out.v = on_target_Bo_I.f / body.mass + environment.gravity;
   const Mat3 R = target.q.toRotationMatrix(), I_I = R * body.I_Bcm_B * R.transpose();
-  out.w = I_I.ldlt().solve(on_target_Bo_I.n - target.w.cross(I_I * target.w));
+  out.w = I_I.inverse() * (on_target_Bo_I.n - target.w.cross(I_I * target.w));
   return out;
 }
 
@@ -126,15 +161,16 @@ Touch advance(const Environment& environment, const FrameMotion& from, const Fra
               double t, double dt, double step, Floating& target, ContactWatch& watch) noexcept {
   Touch mean;
   if (!(dt > 0.0)) return mean;
-  // Far from everything one step does: at less than 5 m/s nothing comes so near in it.
-  constexpr double kFar = 0.01;  // [m]
-  const bool alone =
-      !target.X_TB && dt <= kMostAlone && touch(environment, from, target).least > kFar;
-  const int steps = alone ? 1 : std::max(1, static_cast<int>(std::ceil(dt / step - 1e-9)));
+  const bool near =
+      !(touch(environment, from, target).least > mayShrink(environment, from, to, target, dt));
+  const double most = near ? step : std::max(step, smoothStep(environment, target));
+  const int steps = std::max(1, static_cast<int>(std::ceil(dt / most - 1e-9)));
   const double h = dt / steps;
+  const Passage tool(from, to, dt);
+  FrameMotion end = tool.at(0.0);
   for (int k = 0; k < steps; ++k) {
-    const auto tool = [&](double later) { return between(from, to, dt, (k + later) / steps); };
-    const FrameMotion begin = tool(0.0), middle = tool(0.5), end = tool(1.0);
+    const FrameMotion begin = end, middle = tool.at((k + 0.5) / steps);
+    end = tool.at((k + 1.0) / steps);
     const auto at = [&](const FrameMotion& there, const Floating& body, Touch& touched) {
       touched = touch(environment, there, body);
       return rates(environment, body, touched.on_target_Bo_I);

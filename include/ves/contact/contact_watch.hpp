@@ -3,6 +3,8 @@
 // Contacts as events: when each began, how hard it was, and what came out of it.
 #pragma once
 
+#include <array>
+
 #include "ves/contact/environment.hpp"
 
 namespace ves {
@@ -38,15 +40,19 @@ class ContactWatch {
   struct Place {
     double t, gap;  // [s], [m]
   };
+  double closedAt(double t) const noexcept;  // [m/s] over kMean before t, or since it is known
+
   int count_ = 0;
   bool touching_ = false;
   Contact contact_;
-  double t_ = 0.0;                // [s] of the last look,
-  double gap_ = HUGE_VAL;         // [m] and what it saw
-  Vec3 force_ = Vec3::Zero();     // [N]
-  Place earlier_{0.0, HUGE_VAL};  // kMean and more ago, apart
-  Place later_{-kMean, HUGE_VAL};
-  double parted_ = -1.0;  // [s] where the speed that follows is not known yet
+  double t_ = 0.0;             // [s] of the last look,
+  double gap_ = HUGE_VAL;      // [m] and what it saw
+  Vec3 force_ = Vec3::Zero();  // [N]
+  double parted_ = -1.0;       // [s] where the speed that follows is not known yet
+  // The newest gaps while nothing touches, kApart [s] and more apart.
+  static constexpr double kApart = 0.1 * kMean;
+  std::array<Place, 12> before_{};
+  std::size_t places_ = 0;  // [-] seen since the last contact
 };
 
 }  // namespace ves

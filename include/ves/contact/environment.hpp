@@ -116,8 +116,8 @@ FloatingRates rates(const Environment& environment, const Floating& target,
 bool grasp(const Environment& environment, const FrameMotion& tool, Floating& target) noexcept;
 
 /// Moves the target over dt [s] from t [s] on while the tool goes from one motion to the other, in
-/// Runge-Kutta steps of at most `step` [s], each seen by the watch. Returns the mean of what
-/// touched.
+/// Runge-Kutta steps, each seen by the watch: of at most `step` [s] where the tool touches something
+/// or may before the end. Returns the mean of what touched.
 Touch advance(const Environment& environment, const FrameMotion& from, const FrameMotion& to,
               double t, double dt, double step, Floating& target, ContactWatch& watch) noexcept;
 
