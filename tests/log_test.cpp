@@ -25,7 +25,7 @@ namespace fs = std::filesystem;
 
 using test::refusal;
 
-Sample goodSample() {
+Sample restingSample() {
   Sample s;
   s.sequence = 7;
   s.legs.fill(8000);
@@ -39,7 +39,7 @@ class Log : public testing::Test {
     file_ = fs::temp_directory_path() / ("ves_log_" + std::to_string(getpid()) + ".lcmlog");
     LogWriter writer(file_.string());
     for (int i = 0; i < 5; ++i) {
-      Sample s = goodSample();
+      Sample s = restingSample();
       s.sequence = i;
       writer.write(channel::kSample, toMessage(s, {1, 2}, i), 1'000'000LL * i);
     }
@@ -165,7 +165,7 @@ TEST_F(Log, AFullDiskLosesWholeEventsAndKeepsTheFileWhole) {
   {
     LogWriter writer(file_.string());
     for (int i = 0; i < 1000; ++i) {
-      Sample s = goodSample();
+      Sample s = restingSample();
       s.sequence = i;
       writer.write(channel::kSample, toMessage(s, {1, 2}, i), 10'000'000LL * i);
       if (writer.lost() == 0) written = i + 1;
@@ -188,7 +188,7 @@ TEST_F(Log, AFullDiskLosesWholeEventsAndKeepsTheFileWhole) {
 TEST_F(Log, AnEventReachesTheFileWithinHalfASecondOfLaterOnes) {  // a kill takes no more
   LogWriter writer(file_.string());
   for (int i = 0; i <= 500; ++i) {
-    Sample s = goodSample();
+    Sample s = restingSample();
     s.sequence = i;
     writer.write(channel::kSample, toMessage(s, {1, 2}, i), 1'000'000'000'000 + 10'000'000LL * i);
   }

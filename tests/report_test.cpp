@@ -84,8 +84,6 @@ TEST(ReferenceMotions, AreSharedByRunsThatDifferInWhatTheBaseDoesNotFeel) {
     base({other});
     EXPECT_EQ(references.computed(), ++computed) << other;
   }
-  base({});  // longer ago than is kept
-  EXPECT_EQ(references.computed(), ++computed);
 }
 
 TEST(VesOnTheArm, RingsDownAsTheModelOfItsLoopSays) {

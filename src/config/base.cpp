@@ -9,6 +9,7 @@
 #include <set>
 
 #include "readers.hpp"
+#include "ves/base/memo.hpp"
 #include "ves/math/dense.hpp"
 
 namespace ves {
@@ -165,6 +166,14 @@ ArmDescription readArm(Section& s) {
   return arm;
 }
 
+/// Their modes take as long as a run in lockstep, and who loads many experiments has few arms.
+std::shared_ptr<const ArmModes> modesOfArm(const ArmDescription& arm, const ArmModel& model,
+                                           int keep) {
+  constexpr std::size_t kKept = 16;
+  static Memo<std::pair<ArmDescription, int>, ArmModes, kKept> known;
+  return known.of({arm, keep}, [&] { return armModes(model, arm.damping_ratio, keep); });
+}
+
 }  // namespace
 
 Base readBase(Section s) {
@@ -177,9 +186,9 @@ Base readBase(Section s) {
     const int dofs = out.arm->frame.dofs();
     if (dofs == 0) section.fail("chain", "has nothing that can move");
     try {
-      ArmModes modes = armModes(*out.arm, arm.damping_ratio, readKeep(s, dofs));
-      out.modes = std::move(modes.tip);
-      out.shape = std::move(modes.shape);
+      const std::shared_ptr<const ArmModes> modes = modesOfArm(arm, *out.arm, readKeep(s, dofs));
+      out.modes = modes->tip;
+      out.shape = modes->shape;
     } catch (const std::domain_error&) {
       section.fail("chain",
                    "a part that can move has no mass; want mass in every beam, or inertia "

@@ -58,27 +58,24 @@ Motion actual(const Series& series) {
   return out;
 }
 
-const std::optional<Motion>& ReferenceMotions::of(const Interaction& interaction, std::int64_t step,
-                                                  std::int64_t duration,
-                                                  const Eigen::VectorXd& eta) {
-  const auto at = std::find_if(known_.begin(), known_.end(), [&](const Known& k) {
-    return k.interaction == interaction && k.step == step && k.duration == duration && k.eta == eta;
+std::shared_ptr<const std::optional<Motion>> ReferenceMotions::of(const Interaction& interaction,
+                                                                  std::int64_t step,
+                                                                  std::int64_t duration,
+                                                                  const Eigen::VectorXd& eta) {
+  return known_.of({interaction, step, duration, eta}, [&]() -> std::optional<Motion> {
+    ++computed_;
+    InteractionOptions options;
+    options.model = InteractionModel::kWhole;
+    options.step = step;
+    options.duration = duration;
+    options.eta = eta;
+    options.eta_dot = Eigen::VectorXd::Zero(eta.size());
+    try {
+      return motion(simulate(interaction, options));
+    } catch (const std::domain_error&) {
+      return {};
+    }
   });
-  if (at != known_.end()) return at->motion;
-  if (known_.size() == kKept) known_.pop_front();
-  Known& fresh = known_.emplace_back(Known{interaction, step, duration, eta, {}});
-  ++computed_;
-  InteractionOptions options;
-  options.model = InteractionModel::kWhole;
-  options.step = step;
-  options.duration = duration;
-  options.eta = eta;
-  options.eta_dot = Eigen::VectorXd::Zero(eta.size());
-  try {
-    fresh.motion = motion(simulate(interaction, options));
-  } catch (const std::domain_error&) {
-  }
-  return fresh.motion;
 }
 
 std::optional<Emulation> emulation(const Series& series) {
@@ -102,10 +99,9 @@ std::optional<BaseMotion> baseMotion(const Experiment& e, const Vec6& start,
   const Eigen::VectorXd eta = leastSquares(interaction.base.Phi, start);
   const Vec6 rest = start - interaction.base.Phi * eta;
   if (interaction.world) interaction.X_IH.p += rest.head<3>();
-  const std::optional<Motion>& base =
-      references.of(interaction, e.controller.period, duration, eta);
-  if (!base) return {};
-  return BaseMotion{*base, rest};
+  const auto base = references.of(interaction, e.controller.period, duration, eta);
+  if (!*base) return {};
+  return BaseMotion{**base, rest};
 }
 
 std::optional<Emulation> emulation(const Series& series, ReferenceMotions& references) {

@@ -27,7 +27,7 @@ Overrides with(Overrides a, const Overrides& b) {
 Reproduction::Reproduction(fs::path config_folder, const fs::path& folder, const Progress& progress)
     : config(std::move(config_folder)),
       scratch(folder),
-      shared_(new Shared{Claims(config / "claims.yaml"), progress, {}}) {}
+      shared_(std::make_shared<Shared>(Claims(config / "claims.yaml"), progress)) {}
 
 Reproduction Reproduction::piece() const {
   Reproduction out(*this);
@@ -120,7 +120,7 @@ Chapter4 reproduceChapter4(const fs::path& config, const fs::path& folder, int w
                                   static_cast<std::size_t>(workers));
   Reproduction r(config, folder, progress);
   constexpr void (*kSections[])(Reproduction&) = {
-      sensorSection,    ratesSection,  motionSection,      shuttleArmSection,
+      sensorSection,    ratesSection,  motionSection,       shuttleArmSection,
       stabilitySection, massesSection, compensationSection, contactSection};
   r.parts(std::size(kSections), [&](Reproduction& piece, std::size_t i) { kSections[i](piece); });
   if (const std::vector<std::string> open = r.openClaims(); !open.empty())

@@ -69,7 +69,7 @@ class Reproduction {
   Run record(const std::string& name, const Experiment& e);
   /// The platform beside its base, where the base's motion is known from other runs too.
   std::optional<Emulation> emulation(const Series& series) {
-    return ves::emulation(series, references_);
+    return ves::emulation(series, shared_->references);
   }
 
   /// Puts the claim with these numbers onto the page.
@@ -89,16 +89,18 @@ class Reproduction {
  private:
   /// Of all pieces.
   struct Shared {
+    Shared(Claims c, Progress p) : claims(std::move(c)), progress(std::move(p)) {}
+
     Claims claims;
     Progress progress;
     std::mutex mutex;
     int runs = 0;
+    ReferenceMotions references;
   };
   Reproduction piece() const;  // empty, of the same whole
   void append(const Reproduction& piece);
 
   std::shared_ptr<Shared> shared_;
-  ReferenceMotions references_;
 };
 
 /// A line of a panel: what the rows of segments of one kind show.

@@ -3,11 +3,13 @@
 // The platform's motion in an admittance segment beside SRMS-robot's (section 4.3).
 #pragma once
 
-#include <deque>
+#include <atomic>
 #include <map>
+#include <memory>
 #include <optional>
 #include <vector>
 
+#include "ves/base/memo.hpp"
 #include "ves/results/series.hpp"
 #include "ves/srms/interaction.hpp"
 
@@ -62,26 +64,31 @@ struct Emulation : BaseMotion {
   Motion platform;  // in the first admittance segment, without `rest`
 };
 
-/// The base's motions that were needed last. Runs that differ in noise, gains or filters share one:
-/// it depends on nothing but what is compared here.
+/// The base's motions that were needed last, for several threads. Runs that differ in noise, gains
+/// or filters share one: it depends on nothing but what is compared here.
 class ReferenceMotions {
  public:
   /// SRMS-robot with nothing left out, the modes at rest at eta. None where the motion grows
   /// without bound.
-  const std::optional<Motion>& of(const Interaction& interaction, std::int64_t step,
-                                  std::int64_t duration, const Eigen::VectorXd& eta);
+  std::shared_ptr<const std::optional<Motion>> of(const Interaction& interaction, std::int64_t step,
+                                                  std::int64_t duration,
+                                                  const Eigen::VectorXd& eta);
   int computed() const { return computed_; }  // [-]
 
  private:
-  static constexpr std::size_t kKept = 4;
-  struct Known {
+  static constexpr std::size_t kKept = 32;
+  struct Asked {
     Interaction interaction;
     std::int64_t step, duration;  // [ns]
     Eigen::VectorXd eta;
-    std::optional<Motion> motion;
+
+    bool operator==(const Asked& o) const {
+      return interaction == o.interaction && step == o.step && duration == o.duration &&
+             eta == o.eta;
+    }
   };
-  std::deque<Known> known_;
-  int computed_ = 0;
+  Memo<Asked, std::optional<Motion>, kKept> known_;
+  std::atomic<int> computed_ = 0;
 };
 
 /// In the first admittance segment of the program, let go at `start` from home. None without

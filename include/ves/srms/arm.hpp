@@ -19,16 +19,22 @@ struct ArmJoint {
   Vec3 axis = Vec3::UnitZ();  // [-] unit vector
   double angle = 0.0;         // [rad] locked there, with a spring
   double stiffness = 0.0;     // [N m/rad]
+
+  bool operator==(const ArmJoint&) const = default;
 };
 
 struct ArmBeam {
   Vec3 to = Vec3::Zero();  // [m] its far end from its near one
   BeamSection section;
   int elements = 1;  // [-]
+
+  bool operator==(const ArmBeam&) const = default;
 };
 
 struct ArmHousing {
   RigidBody body;
+
+  bool operator==(const ArmHousing&) const = default;
 };
 
 /// Parts from root to tip, each in the axes that the joints before it leave.
@@ -40,6 +46,8 @@ struct ArmDescription {
   double damping_ratio = 0.0;    // [-] zeta of every mode
   Mat3 R_TP = Mat3::Identity();
   RigidBody payload_P;  // carried at the tip beside what the platform carries
+
+  bool operator==(const ArmDescription&) const = default;
 };
 
 struct ArmModel {

@@ -18,6 +18,8 @@ struct BeamSection {
   double EA = 0.0;               // [N] stretch
   double mass_per_length = 0.0;  // [kg/m]
   double radius = 0.0;           // [m] of the wall; its mass resists torsion with m r^2
+
+  bool operator==(const BeamSection&) const = default;
 };
 
 /// A frame under construction. Everything is expressed in one set of axes, A; small displacements
