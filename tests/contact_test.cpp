@@ -454,6 +454,27 @@ TEST(Grip, TakesTheTargetAlongWhereItWasTaken) {
   EXPECT_EQ(watch.count(), 0) << "what is held is not touched";
 }
 
+// A light target on a stiff grip swings about the tool as mass and spring do, however long the
+// looks.
+TEST(Grip, SwingsAsItsSpringSays) {
+  Floating body;
+  FrameMotion still;
+  Environment e = gripping(body, still);
+  constexpr double kMass = 2.0, kStiffness = 2e6, kAway = 1e-3, kLook = 1e-3;
+  e.target->mass = kMass;
+  e.grip = Grip{kStiffness, 0.0, 2e3, 0.0, 5e-3};
+  still = {};
+  body.v.setZero();
+  ASSERT_TRUE(grasp(e, still, body));
+  const double at = body.p.x(), omega = std::sqrt(kStiffness / kMass);
+  body.p.x() += kAway;
+  ContactWatch watch;
+  for (int i = 1; i <= 100; ++i) {  // 16 swings
+    advance(e, still, still, (i - 1) * kLook, kLook, 1e-5, body, watch);
+    EXPECT_NEAR(body.p.x() - at, kAway * std::cos(omega * i * kLook), 1e-3 * kAway) << i;
+  }
+}
+
 // Action and reaction, about one point.
 TEST(Grip, PushesBackOnTheTool) {
   Floating body;
