@@ -444,6 +444,25 @@ TEST_F(Emulation, GateHoldsForWhatTheBeliefMayBeOffBy) {
   EXPECT_EQ(verdict("0.004", "0", "0"), Stability::kUnstable);
   EXPECT_EQ(verdict("0", "0", "0.5"), Stability::kStable);
   EXPECT_EQ(verdict("0", "0.1", "0.5"), Stability::kUnstable);
+  // The corner that it names is one that grows; the same with the mass to the other side decays.
+  const Experiment both = experiment("puma_on_table_4_1", kCompensated,
+                                     with(heavy, {"controller.compensation.timing_error_s=0",
+                                                  "controller.compensation.gain_error=0.1",
+                                                  "controller.compensation.mass_error=0.5"}));
+  const std::array<int, 3> corner = assessStability(both.controller, both.plant).off;
+  const auto growth = [&](double mass, double gain) {
+    double most = -HUGE_VAL;
+    for (const Direction direction : {Direction::kExtending, Direction::kRetracting}) {
+      Loop loop = loopOf(both.controller, both.plant, both.plant.initial_joints, direction);
+      loop.robot_P.mass *= 1.0 + 0.5 * mass;
+      loop.robot_P.I_Bcm_B *= 1.0 + 0.5 * mass;
+      loop.velocity_gain *= 1.0 + 0.1 * gain;
+      most = std::max(most, dominantRoot(loop).growth);
+    }
+    return most;
+  };
+  EXPECT_GT(growth(corner[2], corner[1]), 0.0);
+  EXPECT_LT(growth(-corner[2], corner[1]), 0.0);
 }
 
 TEST_F(Emulation, ComesInWithoutABump) {

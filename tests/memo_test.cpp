@@ -46,19 +46,24 @@ TEST(Memo, PassesOnWhatIsThrownAndKeepsNothingOfIt) {
 }
 
 TEST(Memo, OneOfManyThreadsComputes) {
-  constexpr int kThreads = 8;
-  Memo<int, int, 2> memo;
-  std::atomic<int> computed = 0, right = 0;
+  constexpr int kThreads = 8, kKeys = 2000;
+  Memo<int, int, kKeys> memo;
+  std::vector<std::atomic<int>> computed(kKeys);
+  std::atomic<int> right = 0;
   std::latch all(kThreads);
   std::vector<std::thread> threads;
   for (int i = 0; i < kThreads; ++i)
     threads.emplace_back([&] {
       all.arrive_and_wait();
-      right += *memo.of(1, [&] { return ++computed; }) == 1;
+      for (int key = 0; key < kKeys; ++key)
+        right += *memo.of(key, [&] {
+          ++computed[static_cast<std::size_t>(key)];
+          return -key;
+        }) == -key;
     });
   for (std::thread& one : threads) one.join();
-  EXPECT_EQ(computed, 1);
-  EXPECT_EQ(right, kThreads);
+  for (const std::atomic<int>& times : computed) EXPECT_EQ(times, 1);
+  EXPECT_EQ(right, kThreads * kKeys);
 }
 
 }  // namespace
