@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <atomic>
 #include <latch>
 #include <stdexcept>
@@ -45,21 +46,32 @@ TEST(Memo, PassesOnWhatIsThrownAndKeepsNothingOfIt) {
   EXPECT_EQ(*memo.of(1, [] { return 7; }), 7);
 }
 
+/// Lets other threads in while it is compared, and sees them come.
+struct SlowKey {
+  int value;
+  std::atomic<int>* comparing;
+  bool operator==(const SlowKey& o) const {
+    EXPECT_EQ(++*comparing, 1);
+    for (int i = 0; i < 10; ++i) std::this_thread::yield();
+    --*comparing;
+    return value == o.value;
+  }
+};
+
 TEST(Memo, OneOfManyThreadsComputes) {
-  constexpr int kThreads = 8, kKeys = 2000;
-  Memo<int, int, kKeys> memo;
-  std::vector<std::atomic<int>> computed(kKeys);
-  std::atomic<int> right = 0;
+  constexpr int kThreads = 8, kKeys = 50;
+  Memo<SlowKey, int, kKeys> memo;
+  std::array<std::atomic<int>, kKeys> computed{};
+  std::atomic<int> comparing = 0, right = 0;
   std::latch all(kThreads);
   std::vector<std::thread> threads;
   for (int i = 0; i < kThreads; ++i)
     threads.emplace_back([&] {
       all.arrive_and_wait();
-      for (int key = 0; key < kKeys; ++key)
-        right += *memo.of(key, [&] {
-          ++computed[static_cast<std::size_t>(key)];
-          return -key;
-        }) == -key;
+      for (int key = 0; key < kKeys; ++key) {
+        std::atomic<int>& times = computed[static_cast<std::size_t>(key)];
+        right += *memo.of({key, &comparing}, [&] { return ++times; }) == 1;
+      }
     });
   for (std::thread& one : threads) one.join();
   for (const std::atomic<int>& times : computed) EXPECT_EQ(times, 1);
