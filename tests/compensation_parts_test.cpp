@@ -388,6 +388,7 @@ struct SideBySide {
         filter.jump(a);
         filter.advance(step, a);
         felt.push_back(filter.output()(0));
+        length.push_back(leg.actuator.length());
       }
       if (late > 0) observer.arrived(k, k * kTick + late);
       observer.advance((k + 1) * kTick);
@@ -396,6 +397,7 @@ struct SideBySide {
       observer.correct(legLengths(e.controller.legs, read), (k + 1) * kTick);
       modelled.push_back(observer.filteredAcceleration((k + 1) * kTick)(0));
       earlier.push_back(observer.filteredAcceleration((k + 1) * kTick - 3'700'000)(0));
+      work.push_back(observer.workLength((k + 1) * kTick)(0));
     }
   }
   /// The machine's at `time` [ns], or its mean over `window` before.
@@ -423,7 +425,7 @@ struct SideBySide {
   Leg leg;
   ServoObserver observer;
   std::int32_t reference = legCounts(e.controller.legs, Vec6::Constant(1.5))[0];
-  std::vector<double> felt, modelled, earlier;
+  std::vector<double> felt, length, modelled, earlier, work;
 };
 
 TEST(ServoObserver, FeelsWhatTheSensorFeelsAtOnceAndOnAverage) {
@@ -452,6 +454,48 @@ TEST(ServoObserver, ASensorThatIsLaterShowsWhatWas) {
       EXPECT_LT(late.off(found, window, ago), 0.05) << delay;
       EXPECT_GT(late.off(found, window, -ago), 1.5 * late.off(found, window, ago)) << delay;
     }
+}
+
+// A force that swings as the machine's leg does pushes on it: its work by small steps, and from
+// what the sensor's filter lets through, a mean a tick, along the model's work length.
+TEST(ServoObserver, AFilteredForceDoesItsWorkAlongTheWorkLength) {
+  ServoModel servo = experiment("z_sine", kCompensated).controller.servo;
+  for (const double delay : {0.0, 4e-3}) {
+    servo.sensor_delay = delay;
+    const SideBySide run(servo);
+    const double dt = SideBySide::kStep * 1e-9;
+    const auto late = static_cast<std::size_t>(std::lround(delay / dt));
+    const std::size_t steps = kTick / SideBySide::kStep;
+    for (const double phase : {0.0, 1.0, 2.0, 3.0}) {
+      const auto force = [&](std::size_t i) {  // from rest to rest
+        const double t = dt * static_cast<double>(i), s = t / 1.98;
+        return s < 1.0 ? std::pow(std::sin(M_PI * s), 2) * std::cos(3.0 * t) *
+                             std::sin(25.0 * t + phase)
+                       : 0.0;
+      };
+      Butterworth2<1> filter(servo.sensor_cutoff);
+      const auto step = filter.prepare(dt);
+      std::vector<double> shown(late, 0.0);
+      double due = 0.0, all = 0.0;
+      for (std::size_t i = 1; i < run.length.size(); ++i) {
+        const double work = force(i) * (run.length[i] - run.length[i - 1]);
+        due += work;
+        all += std::abs(work);
+        filter.advance(step, Butterworth2<1>::Channels(force(i)));
+        shown.push_back(filter.output()(0));
+      }
+      double found = 0.0, along_lengths = 0.0;
+      for (std::size_t k = 1; k < run.work.size(); ++k) {
+        double mean = 0.0;
+        for (std::size_t i = k * steps; i < (k + 1) * steps; ++i)
+          mean += shown[i] / static_cast<double>(steps);
+        found += mean * (run.work[k] - run.work[k - 1]);
+        along_lengths += mean * (run.length[(k + 1) * steps - 1] - run.length[k * steps - 1]);
+      }
+      EXPECT_NEAR(found, due, 0.015 * all) << delay << " " << phase;
+      EXPECT_GT(std::abs(along_lengths - due), 0.1 * all);
+    }
+  }
 }
 
 TEST(ServoObserver, ACommandCountsFromWhenTheMachineSaysItCame) {
@@ -492,6 +536,27 @@ TEST(ServoObserver, AReadingIsComparedWithTheModelAtItsOwnTime) {
   const Vec6 corrected = observer.length();
   observer.correct(then.array() + more, 5 * kTick);  // it is known by now
   EXPECT_LT((observer.length() - corrected).cwiseAbs().maxCoeff(), 1e-12);
+}
+
+// A leg that moves is elsewhere by as much as the time of its reading may be wrong.
+TEST(ServoObserver, AReadingsTimeMayBeWrongByItsJitter) {
+  ServoModel servo = experiment("z_sine", kCompensated).controller.servo;
+  servo.jitter = 2e-3;
+  constexpr std::int64_t kThen = 3 * kTick + 137'000;  // between two of what the model remembers
+  ServoObserver observer(servo, 0.01), twin(servo, 0.01);
+  for (ServoObserver* one : {&observer, &twin}) {
+    one->reset(Vec6::Constant(1.5), 0);
+    one->send(Vec6::Constant(1.52), 0, 0);
+  }
+  twin.advance(kThen);
+  const Vec6 L = twin.length(), slack = 0.5 * servo.readings.scale + servo.jitter * twin.velocity();
+  ASSERT_GT(slack(0), 2.0 * servo.readings.scale(0));
+  observer.advance(4 * kTick);
+  const Vec6 now = observer.length();
+  observer.correct(L + 0.98 * slack, kThen);
+  EXPECT_EQ(observer.length(), now);
+  observer.correct(L + 1.02 * slack, kThen);
+  EXPECT_LT((observer.length() - now - 0.02 * slack).cwiseAbs().maxCoeff(), 0.005 * slack(0));
 }
 
 }  // namespace

@@ -35,7 +35,7 @@ const PathPoint<6>& AdmittanceControl::step(const AdmittanceInput& in, const Vec
     else
       model_.step(in.F_Po_I, energy_.damping());
     slowInsideEnvelope(last, in.L, checks);
-    energy_.take(in.F_Po_I, in.measured.stacked(), model_.taken(in.F_Po_I), model_.damped(),
+    energy_.take(in.F_Po_I, in.work_place, model_.taken(in.F_Po_I), model_.damped(),
                  model_.kineticEnergy());
     const bool held = scale_ < 1.0 && model_.kineticEnergy() > growth_floor_;
     oscillation_.take(model_.energy(), held, in.q, joint_moves_, period_, growth_floor_);

@@ -10,7 +10,7 @@ LegEstimator::LegEstimator(const ControllerConfig& config)
       codec_(config.legs),
       period_(config.periodSeconds()),
       reading_jump_(config.safety.reading_jump),
-      observes_(config.compensation.observer),
+      feels_(config.compensation.inertia),
       adapts_(config.compensation.adaptation),
       servo_(config.servo, period_),
       adaptation_(config.servo,
@@ -33,13 +33,13 @@ const Measured& LegEstimator::update(const SampleStream& samples, const Elapsed&
   if (!following) {
     servo_.reset(measured_.L, sample.time);
     adaptation_.reset(measured_.L, sample.time);
-  } else if (observes_ && samples.fresh()) {
+  } else if (samples.fresh()) {
     servo_.arrived(sample.command_tick, sample.command_time);
     servo_.advance(std::max(sample.legs_time, sample.wrench_time));
     servo_.correct(measured_.L, sample.legs_time);
     if (adapts_) adapt(sample);
   }
-  if (observes_)
+  if (feels_)
     felt_ = {measured_.L, servo_.velocity(), servo_.filteredAcceleration(sample.wrench_time)};
 
   const ForwardSolution forward = forwardPose(geometry_, measured_.L, measured_.X_IP);
@@ -49,6 +49,12 @@ const Measured& LegEstimator::update(const SampleStream& samples, const Elapsed&
   return measured_;
 }
 
+Vec6 LegEstimator::workPlace(std::int64_t time) noexcept {
+  const ForwardSolution forward =
+      forwardPose(geometry_, servo_.workLength(time), measured_.X_IP, near_);
+  return geometry_.toHome(forward.ok() ? forward.X_IP : measured_.X_IP).stacked();
+}
+
 void LegEstimator::adapt(const Sample& sample) noexcept {
   adaptation_.arrived(sample.command_tick, sample.command_time);
   adaptation_.learn(measured_.L, sample.legs_time);
@@ -56,7 +62,6 @@ void LegEstimator::adapt(const Sample& sample) noexcept {
 }
 
 void LegEstimator::sent(const LegCounts& counts, std::int64_t tick, std::int64_t time) noexcept {
-  if (!observes_) return;
   const Vec6 reference = legLengths(codec_, counts);
   servo_.send(reference, tick, time);
   adaptation_.send(reference, tick, time);

@@ -37,9 +37,13 @@ void ServoObserver::remember() noexcept {
   const double w = servos_.model().sensor_cutoff;
   const Channels a = filter_.output(), a_rate = filter_.rate();
   const Vec6& v = servos_.velocity();
-  past_[remembered_++ % kInstants] = {
-      servos_.time(), servos_.length(), v, v - ((a_rate + M_SQRT2 * w * a) / (w * w)).matrix(),
-      a.matrix(),     a_rate.matrix()};
+  past_[remembered_++ % kInstants] = {servos_.time(),
+                                      servos_.length(),
+                                      v,
+                                      v - ((a_rate + M_SQRT2 * w * a) / (w * w)).matrix(),
+                                      a.matrix(),
+                                      a_rate.matrix(),
+                                      servos_.acceleration()};
 }
 
 /// Between two instants by cubic Hermite polynomials, the acceleration's rate by a line; outside
@@ -65,6 +69,10 @@ ServoObserver::Instant ServoObserver::at(std::int64_t time) const noexcept {
     out.filtered_v = between(&Instant::filtered_v, &Instant::filtered_a);
     out.filtered_a = between(&Instant::filtered_a, &Instant::filtered_a_rate);
     out.filtered_a_rate = (1.0 - s) * earlier.filtered_a_rate + s * later->filtered_a_rate;
+    // Between two updates v goes to where the last one sends it.
+    const Eigen::Array<double, kLegs, 1> tau = model().tau.array(), decay = (-h * s / tau).exp();
+    out.a = (earlier.a.array() * decay).matrix();
+    out.v = earlier.v + (tau * (1.0 - decay) * earlier.a.array()).matrix();
     return out;
   }
   return *later;
@@ -76,6 +84,12 @@ Vec6 ServoObserver::filteredAcceleration(std::int64_t time) const noexcept {
   if (!(window > 0.0)) return end.filtered_a - delay * end.filtered_a_rate;
   const Instant begin = at(time - std::llround(window * 1e9));
   return (end.filtered_v - begin.filtered_v - delay * (end.filtered_a - begin.filtered_a)) / window;
+}
+
+Vec6 ServoObserver::workLength(std::int64_t time) const noexcept {
+  const double w = model().sensor_cutoff;
+  const Instant then = at(time - std::llround(model().sensor_delay * 1e9));
+  return then.L - (M_SQRT2 / w) * then.v + then.a / (w * w);
 }
 
 void ServoObserver::correct(const Vec6& L, std::int64_t time) noexcept {

@@ -92,9 +92,10 @@ PathPoint<6> TestPlatform::nextMotion(const Wrench& dynamic) noexcept {
   if (supervisor_.runs(motion_, SegmentKind::kCalibration))
     bias_.calibrate(sample, samples_.fresh(), load_.counts());
   if (supervisor_.runs(motion_, SegmentKind::kAdmittance))
-    return motion_.admittanceModel({dynamic, robot_.M_1(), share_.value(), samples_.wrench(),
-                                    sample.q, commander_.legs().L, legs_.measured().pose},
-                                   safety_.path());
+    return motion_.admittanceModel(
+        {dynamic, robot_.M_1(), share_.value(), samples_.wrench(), sample.q, commander_.legs().L,
+         legs_.workPlace(sample.wrench_time)},
+        safety_.path());
   if (supervisor_.moves()) return motion_.trajectoryGeneration();
   // Until the legs follow, they are where they are measured.
   const bool at_measured = supervisor_.disarmed() ||

@@ -19,7 +19,7 @@ struct AdmittanceInput {
   const WrenchTiming& wrench;  // when F_Po_I was read
   const JointVector& q;        // of the robot
   const Vec6& L;               // [m] lengths last commanded
-  const Pose& measured;        // of the platform
+  const Vec6& work_place;      // [m, rad] along which F_Po_I does its work
 };
 
 class AdmittanceControl {

@@ -6,6 +6,7 @@
 // An ideal base takes the work that the robot does on it, F^T x', where the platform is. This one
 // takes F^T x' of its model; the robot, the contact at its tool and what it pushes feel the
 // platform, which is late. What the two differ in, nobody has done: the emulation has put it in.
+// The wrench is behind the sensor's filter; its work is counted along ServoObserver::workLength().
 //
 // The tank is De Stefano, Balachandran and Secchi's (IEEE T-RO 36(1), 2020): filled to its reserve
 // at most, it is emptied by what is put in; below zero the model's modes are damped, all alike,
@@ -23,10 +24,11 @@ class EnergyAccount {
 
   void reset() noexcept;
 
-  /// One step of admittance control: F_Po_I has acted on the platform that was last measured at x
-  /// [m, rad], `taken` [J] is what the model took of it, `paid` [J] what damping took of the model,
-  /// `kinetic` [J] what is in its motion.
-  void take(const Wrench& F_Po_I, const Vec6& x, double taken, double paid,
+  /// One step of admittance control: the work of F_Po_I since the step before is along the way from
+  /// the last work_place [m, rad] to this one (ServoObserver::workLength()); `taken` [J] is what
+  /// the model took of it, `paid` [J] what damping took of the model, `kinetic` [J] what is in its
+  /// motion.
+  void take(const Wrench& F_Po_I, const Vec6& work_place, double taken, double paid,
             double kinetic) noexcept;
 
   double putIn() const noexcept { return put_in_; }     // [J] since the beginning, paid or not
@@ -35,12 +37,12 @@ class EnergyAccount {
 
  private:
   Passivity passivity_;
-  double age_;   // [ticks] by which a wrench is older than the middle of the tick before it
-  double slew_;  // [1/s] a tick
+  bool averages_;  // a wrench is a mean since the one before, not a reading
+  double slew_;    // [1/s] a tick
   double put_in_ = 0.0, paid_ = 0.0, tank_ = 0.0;  // [J]
   double damping_ = 0.0;
-  int known_ = 0;  // [-] poses that are known of the last two
-  Vec6 x_ = Vec6::Zero(), moved_ = Vec6::Zero();
+  bool known_ = false;  // of the step before:
+  Vec6 F_ = Vec6::Zero(), work_place_ = Vec6::Zero();
 };
 
 }  // namespace ves

@@ -40,8 +40,11 @@ class LegEstimator {
     return std::clamp(age, 0.0, 5.0 * period_);
   }
   /// Measured lengths, and rates and accelerations by the servo model as the sample's wrench shows
-  /// them.
+  /// them; of a controller that compensates inertia.
   const LegMotion& feltMotion() const noexcept { return felt_; }
+  /// [m, rad] Coordinates about home along which a wrench that was read at `time` [ns] does its
+  /// work: of ServoObserver::workLength().
+  Vec6 workPlace(std::int64_t time) noexcept;
 
  private:
   void adapt(const Sample& sample) noexcept;
@@ -50,13 +53,14 @@ class LegEstimator {
   LegCodec codec_;
   double period_;        // [s]
   double reading_jump_;  // [m] of a leg at rest, from one sample to the next
-  bool observes_, adapts_;
+  bool feels_, adapts_;
   ServoObserver servo_;
   ServoAdaptation adaptation_;
   LegReadings readings_;
   LegSpeed speed_;
   Measured measured_;
   LegMotion felt_;
+  JacobianFactors near_;
 };
 
 }  // namespace ves

@@ -57,6 +57,9 @@ class ModelledServos {
   std::int64_t time() const noexcept { return now_; }   // [ns] where they are
   const Vec6& length() const noexcept { return L_; }    // [m]
   const Vec6& velocity() const noexcept { return v_; }  // [m/s]
+  Vec6 acceleration() const noexcept {                  // [m/s^2]
+    return (v_end_ - v_).cwiseQuotient(servo_.tau);
+  }
   /// [m] E of the last update, as far as the rail lets it.
   const Vec6& difference() const noexcept { return E_; }
   double toUpdate() const noexcept { return to_update_; }  // [s] until the next one

@@ -47,6 +47,10 @@ class ServoObserver {
   /// over the sensor's window, sensor_delay before. The mean of the filtered acceleration is the
   /// change of the filtered speed.
   Vec6 filteredAcceleration(std::int64_t time) const noexcept;
+  /// [m] along which a wrench that was read at `time` does its work. What has passed the sensor's
+  /// filter as F was F + sqrt(2)/w F' + F''/w^2; by parts, its work along L is that of F along
+  /// L - sqrt(2)/w L' + L''/w^2.
+  Vec6 workLength(std::int64_t time) const noexcept;
 
  private:
   using Channels = ModelledServos::Channels;
@@ -55,6 +59,7 @@ class ServoObserver {
     std::int64_t time = 0;  // [ns]
     Vec6 L = Vec6::Zero(), v = Vec6::Zero();
     Vec6 filtered_v = Vec6::Zero(), filtered_a = Vec6::Zero(), filtered_a_rate = Vec6::Zero();
+    Vec6 a = Vec6::Zero();  // [m/s^2] after it
   };
   void remember() noexcept;
   Instant at(std::int64_t time) const noexcept;
