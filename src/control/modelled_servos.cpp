@@ -59,9 +59,10 @@ double ModelledServos::reference(int leg) const noexcept {
 
 /// All LegSlaves compare.
 void ModelledServos::update() noexcept {
+  for (int i = 0; i < kLegs; ++i) E_(i) = reference(i);
+  E_ -= reading(L_, v_) + servo_.derivative * v_;
   for (int i = 0; i < kLegs; ++i) {
-    const double X = reading(i, L_(i), v_(i));
-    E_(i) = std::clamp(reference(i) - X - servo_.derivative * v_(i), -servo_.rail, servo_.rail);
+    E_(i) = std::clamp(E_(i), -servo_.rail, servo_.rail);
     v_end_(i) = (E_(i) > 0.0 ? servo_.extend(i) : servo_.retract(i)) * E_(i);
   }
 }
@@ -76,10 +77,12 @@ ModelledServos::Channels ModelledServos::pass(const Passage& passage) noexcept {
   return acceleration;
 }
 
-double ModelledServos::reading(int leg, double L, double v) const noexcept {
-  const double offset = servo_.readings.offset(leg), scale = servo_.readings.scale(leg);
-  const auto count = [&](double length) { return std::floor((length - offset) / scale + 0.5); };
-  return offset + 0.5 * scale * (count(L) + count(L - 2.0 * servo_.reading_age * v));
+Vec6 ModelledServos::reading(const Vec6& L, const Vec6& v) const noexcept {
+  constexpr double kWhole = 6755399441055744.0;  // 1.5 2^52: beside it a double has no fraction
+  const auto offset = servo_.readings.offset.array(), scale = servo_.readings.scale.array();
+  const Channels newer = (L.array() - offset) / scale + kWhole,
+                 older = ((L - 2.0 * servo_.reading_age * v).array() - offset) / scale + kWhole;
+  return offset + 0.5 * scale * ((newer - kWhole) + (older - kWhole));
 }
 
 }  // namespace ves

@@ -111,11 +111,10 @@ Vec6 ServoObserver::rounding(const Vec6& L_dot, double later) const noexcept {
       to_update + std::max(0.0, std::ceil((later - to_update) / update)) * update - later;
   Vec6 sum = Vec6::Zero();
   int updates = 0;
-  for (double t = first; t < period_; t += update, ++updates)
-    for (int i = 0; i < kLegs; ++i) {
-      const double v = L_dot(i), L = L_then(i) + t * v;
-      sum(i) += servos_.reading(i, L, v) - (L - model().reading_age * v);
-    }
+  for (double t = first; t < period_; t += update, ++updates) {
+    const Vec6 L = L_then + t * L_dot;
+    sum += servos_.reading(L, L_dot) - (L - model().reading_age * L_dot);
+  }
   return sum / std::max(1, updates);
 }
 

@@ -63,8 +63,8 @@ class ModelledServos {
   /// [m] E of the last update, as far as the rail lets it.
   const Vec6& difference() const noexcept { return E_; }
   double toUpdate() const noexcept { return to_update_; }  // [s] until the next one
-  /// Mean of a LegSlave's two readings, each to the nearest count, of a leg at L that moves at v.
-  double reading(int leg, double L, double v) const noexcept;
+  /// Mean of a LegSlave's two readings, each to the nearest count, of legs at L that move at v.
+  Vec6 reading(const Vec6& L, const Vec6& v) const noexcept;
   Passage passage(double dt) const noexcept;
 
  private:
