@@ -180,7 +180,7 @@ TEST_F(Programs, ThoseWhoNameAPrivateBusAreOnOneNetworkAndNobodyElse) {
       std::string(VES_TEST_APP_DIR) + "/ves",
       {"on-bus", "a", "sh", "-c",
        network + " > " + (folder_ / "first").string() + ".new; mv " + (folder_ / "first").string() +
-           ".new " + (folder_ / "first").string() + "; sleep 60"});
+           ".new " + (folder_ / "first").string() + "; exec sleep 60"});
   while (!fs::exists(folder_ / "first") && first.running()) usleep(10'000);
   std::string there;
   std::getline(std::ifstream(folder_ / "first"), there);
