@@ -364,11 +364,15 @@ TEST(Marks, AreWhereSegmentsAndTheRobotBegin) {
   std::string said;
   for (const Mark& m : robotMarks(two, 2)) said += fmt::format("{}: {}; ", m.x, m.name);
   EXPECT_EQ(said, "0: joint_2, joint_1; 2: joint_2; 3: at rest; 5: joint_2; 6: at rest; ");
-  // Names that would lie over each other are left out.
-  const std::string lines = markLines({{1.0, "a"}, {1.01, "b"}, {2.0, "c"}}, 10.0);
+  // Names that would lie over each other are left out, and marks beside the axis.
+  const std::string lines =
+      markLines({{-0.1, "early"}, {1.0, "a"}, {1.01, "b"}, {2.0, "c"}, {10.1, "late"}}, 0.0, 10.0);
   EXPECT_NE(lines.find("'a'"), std::string::npos);
   EXPECT_EQ(lines.find("'b'"), std::string::npos);
   EXPECT_NE(lines.find("'c'"), std::string::npos);
+  EXPECT_NE(lines.find("from 1.01,"), std::string::npos);
+  EXPECT_EQ(lines.find("from -0.1,"), std::string::npos);
+  EXPECT_EQ(lines.find("from 10.1,"), std::string::npos);
 }
 
 TEST(Page, BytesAreWrittenAsRfc4648Does) {

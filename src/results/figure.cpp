@@ -75,9 +75,13 @@ std::string svg(const std::vector<Panel>& panels) {
     const auto [low, high] = range(panel);
     const double span = high > low ? high - low : 1.0;  // room for the key above
     script += fmt::format("set yrange [{}:{}]\n", low - 0.05 * span, high + 0.16 * span);
-    script += markLines(panel.marks, panel.lines.empty() || panel.lines[0].x.empty()
-                                         ? 0.0
-                                         : panel.lines[0].x.back() - panel.lines[0].x.front());
+    double from = HUGE_VAL, to = -HUGE_VAL;
+    for (const Line& line : panel.lines)
+      for (const double x : line.x) {
+        from = std::min(from, x);
+        to = std::max(to, x);
+      }
+    script += markLines(panel.marks, from, to);
     std::string plot;
     for (std::size_t i = 0; i < panel.lines.size(); ++i) {
       const Line& line = panel.lines[i];

@@ -66,15 +66,16 @@ std::vector<Mark> merged(std::vector<Mark> marks) {
   return out;
 }
 
-std::string markLines(const std::vector<Mark>& marks, double length) {
+std::string markLines(const std::vector<Mark>& marks, double from, double to) {
   constexpr double kRoom = 0.025;  // [-] of the axis, for a name on its side
   std::string out = "unset arrow\nunset label\n";
   double named = -HUGE_VAL;
   for (const Mark& mark : marks) {
+    if (!(mark.x >= from && mark.x <= to)) continue;  // gnuplot would draw it beside the picture
     out += fmt::format(
         "set arrow from {0},graph 0 to {0},graph 1 nohead back lw 0.8 dt 3 lc rgb '#707070'\n",
         mark.x);
-    if (mark.x - named < kRoom * length) continue;
+    if (mark.x - named < kRoom * (to - from)) continue;
     named = mark.x;
     out += fmt::format(
         "set label {} at {},graph 0.02 left rotate by 90 offset 0.7,0 font ',9' tc rgb '#707070'\n",

@@ -51,7 +51,7 @@ class Page {
         "set offsets graph 0,0,0.18,0.05\n",
         rows == 1 ? 480 : 800, quoted(file), rows, cols, quoted(title), rows == 1 ? 0.14 : 0.085,
         span.from, span.to);
-    script_ += markLines(marks, span.to - span.from);
+    script_ += markLines(marks, span.from, span.to);
   }
 
   void panel(const std::string& ylabel, const std::vector<Curve>& curves) {
@@ -189,7 +189,6 @@ std::vector<std::filesystem::path> drawPlots(const Series& series,
   std::vector<Mark> marks = segmentMarks(series);
   const std::vector<Mark> robot = robotStarts(series);
   marks.insert(marks.end(), robot.begin(), robot.end());
-  std::erase_if(marks, [&](const Mark& m) { return m.x < program.from; });
   marks = merged(marks);
   std::string script;
   std::vector<std::string> files;

@@ -25,8 +25,8 @@ std::vector<Mark> robotMarks(const Experiment& experiment, int segment);
 /// By time; what begins at once has one name.
 std::vector<Mark> merged(std::vector<Mark> marks);
 
-/// gnuplot's lines for them from here on, in place of those before; names where there is room on an
-/// axis so long.
-std::string markLines(const std::vector<Mark>& marks, double length);
+/// gnuplot's lines for those on an axis from here to there, in place of those before; names where
+/// there is room.
+std::string markLines(const std::vector<Mark>& marks, double from, double to);
 
 }  // namespace ves
