@@ -19,11 +19,11 @@ std::vector<Requirement> listen(const Experiment& experiment, const std::string&
                                 double seconds) {
   const Identity self = Identity::draw();
   const setup_t setup = setupOf(experiment, false, header(self, 0, 0));
-  Announcer announcer(url, describe(experiment, self, 0), setup);
   Bus bus(url);
+  Announcer announcer(bus, url, describe(experiment, self, 0), setup);
   std::optional<SampleJudge> judge;
   const std::int64_t start = monotonicNow();
-  bus.subscribe(channel::kSample, [&](const std::string&, const void* data, std::uint32_t size) {
+  bus.subscribe({channel::kSample}, [&](const std::string&, const void* data, std::uint32_t size) {
     if (!judge) judge.emplace(setup, monotonicNow());
     judge->take(data, size, monotonicNow());
   });

@@ -88,7 +88,7 @@ void serveBus(NetFtServer& server, const Experiment& experiment, const std::stri
   Wrench wrench = at_rest.truth().F_So_S;
   std::int64_t heard = 0;  // [ns]
   Bus bus(withKey(url, experiment.key_file));
-  bus.subscribe(channel::kTruth, [&](const std::string&, const void* data, std::uint32_t size) {
+  bus.subscribe({channel::kTruth}, [&](const std::string&, const void* data, std::uint32_t size) {
     if (const auto truth = decode<truth_t>(data, size)) {
       wrench = reading(*truth);
       heard = monotonicNow();

@@ -175,10 +175,11 @@ TEST_F(KeyedBus, CommandsAndOrdersThatAreForgedAlteredOrReplayedAreIgnored) {
   PlantLink link(machine, Identity{3, 3});
   lcm::LCM raw(kDefaultUrl);
   std::vector<std::pair<std::string, Bytes>> heard;
-  stranger.subscribe("VES_.*", [&](const std::string& channel, const void* data, std::uint32_t n) {
-    const auto* bytes = static_cast<const std::uint8_t*>(data);
-    heard.emplace_back(channel, Bytes(bytes, bytes + n));
-  });
+  stranger.subscribe({channel::kLegCommand, channel::kRobot},
+                     [&](const std::string& channel, const void* data, std::uint32_t n) {
+                       const auto* bytes = static_cast<const std::uint8_t*>(data);
+                       heard.emplace_back(channel, Bytes(bytes, bytes + n));
+                     });
   const auto command = [&](std::int64_t sequence, std::int64_t meant) {
     LegCommand c;
     c.engaged = true;
@@ -238,8 +239,8 @@ TEST_F(KeyedBus, TheConfigurationIsSignedTooAndReadableByAll) {
       n += decode<experiment_t>(data, size).has_value();
     };
   };
-  reader.subscribe(channel::kExperiment, count(keyed));
-  open.subscribe(channel::kExperiment, count(plain));
+  reader.subscribe({channel::kExperiment}, count(keyed));
+  open.subscribe({channel::kExperiment}, count(plain));
   experiment_t m{};
   m.header = header({1, 1}, 0, 0);
   m.schema = kSchema;
@@ -290,12 +291,12 @@ TEST_F(KeyedRun, ParksAndReplaysWhileEverythingOnTheBusIsForgedAlteredAndReplaye
     Bus attacker(kDefaultUrl);
     lcm::LCM raw(kDefaultUrl);
     std::vector<std::pair<std::string, Bytes>> heard;
-    attacker.subscribe("VES_(SAMPLE|LEG_COMMAND|OPERATOR|ROBOT)",
-                       [&](const std::string& channel, const void* data, std::uint32_t n) {
-                         const auto* bytes = static_cast<const std::uint8_t*>(data);
-                         if (heard.size() < 5000)
-                           heard.emplace_back(channel, Bytes(bytes, bytes + n));
-                       });
+    attacker.subscribe(
+        {channel::kSample, channel::kLegCommand, channel::kOperator, channel::kRobot},
+        [&](const std::string& channel, const void* data, std::uint32_t n) {
+          const auto* bytes = static_cast<const std::uint8_t*>(data);
+          if (heard.size() < 5000) heard.emplace_back(channel, Bytes(bytes, bytes + n));
+        });
     Process run = start("run", {"z_sine", "--no-plots", "--quiet", "--url", url, "--out",
                                 (folder_ / "run").string(), "--set", kShortProgram});
     std::mt19937 random(7);

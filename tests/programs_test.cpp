@@ -121,7 +121,7 @@ TEST_F(Programs, LcmLoggerBesideARunReplaysToo) {
   enterPrivateBus();
   Bus bus(kDefaultUrl);
   std::int64_t sequence = -1;
-  bus.subscribe(channel::kSample, [&](const std::string&, const void* data, std::uint32_t size) {
+  bus.subscribe({channel::kSample}, [&](const std::string&, const void* data, std::uint32_t size) {
     if (const auto m = decode<sample_t>(data, size)) sequence = m->header.sequence;
   });
   untilNothingIsLost([&] {
@@ -208,7 +208,7 @@ TEST_F(Programs, SecondControllerRefusesToArmAndTheFirstGoesOn) {
   std::set<std::int64_t> commanders;
   Phase phase = Phase::kDisarmed;
   std::int64_t first_source = 0;
-  bus.subscribe(channel::kLegCommand,
+  bus.subscribe({channel::kLegCommand},
                 [&](const std::string&, const void* data, std::uint32_t size) {
                   const auto m = decode<leg_command_t>(data, size);
                   if (!m || !m->engaged) return;
@@ -216,7 +216,7 @@ TEST_F(Programs, SecondControllerRefusesToArmAndTheFirstGoesOn) {
                   commanders.insert(m->header.source);
                   if (first_source == 0) first_source = m->header.source;
                 });
-  bus.subscribe(channel::kState, [&](const std::string&, const void* data, std::uint32_t size) {
+  bus.subscribe({channel::kState}, [&](const std::string&, const void* data, std::uint32_t size) {
     const auto m = decode<state_t>(data, size);
     if (m && m->header.source == first_source) phase = static_cast<Phase>(m->phase);
   });

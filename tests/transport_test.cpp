@@ -245,9 +245,9 @@ TEST_F(PrivateBus, AMachinesClockIsKnownFromWhatGoesToAndFro) {
 }
 
 TEST_F(PrivateBus, WhoComesLateHearsTheConfiguration) {
-  Bus late(kDefaultUrl);
+  Bus late(kDefaultUrl), controller(kDefaultUrl);
   std::int64_t heard = 0, sequence = -1;
-  late.subscribe(channel::kExperiment,
+  late.subscribe({channel::kExperiment},
                  [&](const std::string&, const void* data, std::uint32_t size) {
                    const auto m = decode<experiment_t>(data, size);
                    ASSERT_TRUE(m);
@@ -263,14 +263,14 @@ TEST_F(PrivateBus, WhoComesLateHearsTheConfiguration) {
   setup_t setup{};
   setup.arming_samples = 77;
   std::int64_t setups = 0;
-  late.subscribe(channel::kSetup, [&](const std::string&, const void* data, std::uint32_t size) {
+  late.subscribe({channel::kSetup}, [&](const std::string&, const void* data, std::uint32_t size) {
     const auto m = decode<setup_t>(data, size);
     ASSERT_TRUE(m);
     EXPECT_EQ(m->arming_samples, 77);
     EXPECT_EQ(m->header.source, 7);
     ++setups;
   });
-  Announcer announcer(kDefaultUrl, experiment, setup);
+  Announcer announcer(controller, kDefaultUrl, experiment, setup);
   while (setups < 3 && late.wait(5000)) {
   }
   EXPECT_EQ(heard, 3);
@@ -284,6 +284,7 @@ TEST_F(PrivateBus, WhoComesLateHearsTheConfiguration) {
     query.header = header({1, 1}, i, 0);
     late.publish(channel::kQuery, query);
   }
+  controller.drain();
   while (late.wait(1500)) {
   }
   EXPECT_GT(heard, before);

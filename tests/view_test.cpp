@@ -403,9 +403,9 @@ class Live : public testing::Test {
   static void SetUpTestSuite() { enterPrivateBus(); }
 
   Live() {
-    controllers.subscribe(channel::kQuery,
+    controllers.subscribe({channel::kQuery},
                           [this](const std::string&, const void*, std::uint32_t) { ++queries; });
-    controllers.subscribe(channel::kOperator,
+    controllers.subscribe({channel::kOperator},
                           [this](const std::string&, const void* data, std::uint32_t size) {
                             const auto m = decode<operator_t>(data, size);
                             ASSERT_TRUE(m);

@@ -7,7 +7,7 @@
 namespace ves::devices {
 
 BusPiece::BusPiece(Bus& bus, const std::string& channel) {
-  bus.subscribe(channel, [this, &bus](const std::string&, const void* data, std::uint32_t size) {
+  bus.subscribe({channel}, [this, &bus](const std::string&, const void* data, std::uint32_t size) {
     const auto message = decode<sample_t>(data, size);
     const auto sample = message ? fromMessage(*message) : std::nullopt;
     if (!sample) return;

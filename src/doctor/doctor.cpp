@@ -236,7 +236,7 @@ Latency echo(const std::string& url, int times) {
   const Other other([&] {
     Bus bus(url);
     leg_command_t answer{};
-    bus.subscribe(kThere, [&](const std::string&, const void* data, std::uint32_t size) {
+    bus.subscribe({kThere}, [&](const std::string&, const void* data, std::uint32_t size) {
       const auto m = decode<sample_t>(data, size);
       if (!m) return;
       answer.header.sequence = m->header.sequence;
@@ -246,7 +246,7 @@ Latency echo(const std::string& url, int times) {
   });
   Bus bus(url);
   std::int64_t heard = -1;
-  bus.subscribe(kBack, [&](const std::string&, const void* data, std::uint32_t size) {
+  bus.subscribe({kBack}, [&](const std::string&, const void* data, std::uint32_t size) {
     if (const auto m = decode<leg_command_t>(data, size)) heard = m->header.sequence;
   });
   sample_t sample{};
@@ -274,7 +274,7 @@ Latency response(const Experiment& experiment, const std::string& url, int times
   const Identity self = Identity::draw();
   std::int64_t heard = -2;
   LegCommand command;
-  bus.subscribe(channel::kLegCommand,
+  bus.subscribe({channel::kLegCommand},
                 [&](const std::string&, const void* data, std::uint32_t size) {
                   const auto m = decode<leg_command_t>(data, size);
                   const auto legs = m ? fromMessage(*m) : std::nullopt;

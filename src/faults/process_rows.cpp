@@ -10,6 +10,7 @@
 #include "rows.hpp"
 #include "ves/run/bus_observer.hpp"
 #include "ves/run/process.hpp"
+#include "ves/transport/channels.hpp"
 
 namespace ves {
 namespace {
@@ -57,28 +58,34 @@ std::string margin(const BusObserver& bus, const SafetyLimits& limits) {
                      outside > 0.0 ? "OUTSIDE" : "inside");
 }
 
-/// Datagrams at the bus's address that are no LCM messages, or broken ones.
+/// Datagrams at the bus's address that are no LCM messages, or broken ones, whole and in parts; at
+/// last the two that end liblcm 1.3.1 (lcm-proj/lcm#628): offset and size of a part wrap.
 void floodMalformed(int count) {
   const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   sockaddr_in to{};
   to.sin_family = AF_INET;
   to.sin_port = htons(7667);
   to.sin_addr.s_addr = inet_addr("239.255.76.67");
+  const auto send = [&](const std::string& datagram) {
+    sendto(fd, datagram.data(), datagram.size(), 0, reinterpret_cast<const sockaddr*>(&to),
+           sizeof to);
+  };
+  const std::string name = channel::kLegCommand + '\0';
   std::mt19937 random(1);
-  std::vector<std::uint8_t> packet(1400);
   for (int i = 0; i < count; ++i) {
-    const std::size_t size = random() % packet.size();
-    for (std::size_t k = 0; k < size; ++k) packet[k] = static_cast<std::uint8_t>(random());
-    if (i % 3 && size > 16) {  // LCM's short-message magic, then a channel name of ours
-      const std::uint8_t head[] = {'L', 'C', '0', '2', 0, 0, 0, 1};
-      std::copy(std::begin(head), std::end(head), packet.begin());
-      const char channel[] = "VES_LEG_COMMAND";
-      if (size > 8 + sizeof channel && i % 3 == 1)
-        std::copy(std::begin(channel), std::end(channel), packet.begin() + 8);
+    std::string noise(random() % 1400, ' ');
+    for (char& c : noise) c = static_cast<char>(random());
+    switch (i % 4) {
+      case 0: send(noise); break;
+      case 1: send("LC02" + noise); break;
+      case 2: send("LC02" + noise.substr(0, 4) + name + noise); break;
+      case 3: send("LC03" + noise.substr(0, 12) + std::string(4, '\0') + name + noise); break;
     }
-    sendto(fd, packet.data(), size, 0, reinterpret_cast<const sockaddr*>(&to), sizeof to);
     if (i % 200 == 0) usleep(2000);
   }
+  const std::string head("LC03\0\0\0\1\0\0\0\144", 12);
+  send(head + std::string("\0\0\0\0\0\0\0\3", 8) + name);
+  send(head + std::string("\377\377\377\360\0\1\0\3", 8) + std::string(64, 'x'));
   close(fd);
 }
 

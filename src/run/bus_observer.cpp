@@ -6,7 +6,7 @@
 namespace ves {
 
 BusObserver::BusObserver() {
-  bus.subscribe("VES_(STATE|LEG_COMMAND|TRUTH)",
+  bus.subscribe({channel::kState, channel::kLegCommand, channel::kTruth},
                 [this](const std::string&, const void* data, std::uint32_t size) {
                   if (const auto m = decode<truth_t>(data, size)) {
                     ++truths;

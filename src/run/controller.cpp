@@ -66,12 +66,12 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
   if (!options.log.empty()) {
     log = std::make_unique<LogWriter>(options.log);
     log->write(channel::kExperiment, describe(experiment, self, 0), 0);
-    bus.subscribe("VES_(SAMPLE|TRUTH|OPERATOR)",
+    bus.subscribe({channel::kSample, channel::kTruth, channel::kOperator},
                   [&](const std::string& from, const void* data, std::uint32_t size) {
                     log->write(from, data, size, link.sampleTime());
                   });
   }
-  Announcer announcer(options.url, describe(experiment, self, 0),
+  Announcer announcer(bus, options.url, describe(experiment, self, 0),
                       setupOf(experiment, options.lockstep, header(self, 0, 0)));
 
   TickInput in;

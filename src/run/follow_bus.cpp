@@ -16,7 +16,8 @@ bool followBus(const std::string& url, const std::function<bool()>& stop,
   std::optional<Identity> controller;
   bool described = false;
   std::int64_t heard = 0, asked = 0, queries = 0;  // [ns], [ns], [-]
-  bus.subscribe("VES_(SAMPLE|LEG_COMMAND|STATE|TRUTH|TIMING|ROBOT|OPERATOR|EXPERIMENT)",
+  bus.subscribe({channel::kSample, channel::kLegCommand, channel::kState, channel::kTruth,
+                 channel::kTiming, channel::kRobot, channel::kOperator, channel::kExperiment},
                 [&](const std::string& from, const void* data, std::uint32_t size) {
                   if (from == channel::kExperiment) {
                     const auto m = decode<experiment_t>(data, size);

@@ -16,8 +16,8 @@
 namespace ves {
 namespace {
 
-// Ten samples wait at each tick in the worst case; a stalled controller must still find the newest.
-constexpr int kQueue = 4096;  // [-] messages
+// More than wait after any stall that a run survives: a stalled controller finds the newest.
+constexpr int kAtOnce = 4096;  // [-] datagrams
 
 /// True when the kernel knows where multicast should go; LCM prints a page when it does not.
 bool hasRoute() {
@@ -44,33 +44,16 @@ const std::string& reachable(const BusAddress& address) {
   return address.lcm;
 }
 
-/// One message to ourselves, within two seconds.
-bool echoes(lcm::LCM& lcm) {
-  const std::string channel = "VES_ECHO";
-  struct Heard {
-    bool yes = false;
-    void receive(const lcm::ReceiveBuffer*, const std::string&) { yes = true; }
-  } heard;
-  lcm::Subscription* const subscription = lcm.subscribe(channel, &Heard::receive, &heard);
-  if (!subscription) return false;
-  for (int i = 0; i < 20 && !heard.yes; ++i) {
-    if (lcm.publish(channel, "?", 1) != 0) break;
-    lcm.handleTimeout(100);
-  }
-  lcm.unsubscribe(subscription);
-  return heard.yes;
-}
-
 }  // namespace
 
 BusAddress::BusAddress(const std::string& url) {
   // LCM would print about what it does not understand, or take part of an address.
-  unsigned a, b, c, d, port;
+  unsigned a, b, c, d, number;
   int end = 0;
   const int read =
-      std::sscanf(url.c_str(), "udpm://%3u.%3u.%3u.%3u:%5u%n", &a, &b, &c, &d, &port, &end);
-  bool good = read == 5 && a >= 224 && a <= 239 && b < 256 && c < 256 && d < 256 && port > 0 &&
-              port < 65536;
+      std::sscanf(url.c_str(), "udpm://%3u.%3u.%3u.%3u:%5u%n", &a, &b, &c, &d, &number, &end);
+  bool good = read == 5 && a >= 224 && a <= 239 && b < 256 && c < 256 && d < 256 && number > 0 &&
+              number < 65536;
   std::string rest = url.substr(static_cast<std::size_t>(end));
   lcm = url.substr(0, static_cast<std::size_t>(end));
   for (char lead = '?'; good && !rest.empty(); lead = '&') {
@@ -88,6 +71,8 @@ BusAddress::BusAddress(const std::string& url) {
     throw InputError(fmt::format(
         "--url {}: want udpm://MULTICAST-ADDRESS:PORT[?ttl=N][&key=FILE], for example {}", url,
         kDefaultUrl));
+  group = fmt::format("{}.{}.{}.{}", a, b, c, d);
+  port = static_cast<std::uint16_t>(number);
   lcm += fmt::format("?ttl={}", ttl);
 }
 
@@ -107,7 +92,24 @@ std::string openBusWarning(const std::string& url) {
 Bus::Bus(const std::string& url) : address_(url), lcm_(reachable(address_)) {
   if (!address_.key_file.empty()) key_.emplace(address_.key_file);
   if (!lcm_.good()) throw InputError(fmt::format("--url {}: not a bus that LCM can open", url));
-  if (!echoes(lcm_)) refuse(url);
+  if (!echoes()) refuse(url);
+}
+
+/// One message to ourselves, within two seconds.
+bool Bus::echoes() {
+  const std::string channel = "VES_ECHO";
+  Receiver receiver(address_.group, address_.port);
+  receiver.hear(channel);
+  std::optional<Received> heard;
+  for (int i = 0; i < 20; ++i) {
+    if (lcm_.publish(channel, "?", 1) != 0) return false;
+    const std::int64_t until = monotonicNow() + 100'000'000;
+    do {
+      while (receiver.read(heard))
+        if (heard) return true;
+    } while (receiver.readable(until));
+  }
+  return false;
 }
 
 void Bus::publish(const std::string& channel, const experiment_t& message) {
@@ -122,50 +124,64 @@ void Bus::send(const std::string& channel, std::uint8_t* message, std::size_t si
 }
 
 /// Signed, and not heard before; anything on a bus without a key.
-bool Bus::lets(const std::string& channel, const void* message, std::size_t size) noexcept {
+bool Bus::lets(const Received& message, const std::string& channel) noexcept {
   if (!key_) return true;
-  const auto* bytes = static_cast<const std::uint8_t*>(message);
-  if (!key_->signedBy(channel, bytes, size)) {
+  if (!key_->signedBy(channel, message.data, message.size)) {
     ++refused_.forged;
     return false;
   }
-  if (!guard_.fresh(channel, bytes)) {
+  if (!guard_.fresh(channel, message.data)) {
     ++refused_.replayed;
     return false;
   }
   return true;
 }
 
-void Bus::Subscriber::receive(const lcm::ReceiveBuffer* buffer, const std::string& channel) {
-  // A message comes once to each subscriber, and is looked at once.
-  if (buffer->data != bus.seen_.data || buffer->recv_utime != bus.seen_.time)
-    bus.seen_ = {buffer->data, buffer->recv_utime,
-                 bus.lets(channel, buffer->data, buffer->data_size)};
-  if (!bus.seen_.let) return;
-  const std::int64_t waited = wallNow() - buffer->recv_utime * 1000;
-  constexpr std::int64_t kLongest = 10'000'000'000;  // [ns]; more: somebody set the wall clock
-  bus.arrival_ = monotonicNow() - (waited > 0 && waited < kLongest ? waited : 0);
-  handler(channel, buffer->data, buffer->data_size);
-}
-
-void Bus::subscribe(const std::string& channel, Handler handler) {
-  subscribers_.push_back(std::make_unique<Subscriber>(Subscriber{*this, std::move(handler)}));
-  lcm_.subscribe(channel, &Subscriber::receive, subscribers_.back().get())
-      ->setQueueCapacity(kQueue);
-}
-
-void Bus::drain() noexcept {
-  while (lcm_.handleTimeout(0) > 0) {
+void Bus::subscribe(const std::vector<std::string>& channels, const Handler& handler) {
+  if (!receiver_) receiver_.emplace(address_.group, address_.port);
+  for (const std::string& channel : channels) {
+    receiver_->hear(channel);
+    subscriptions_.push_back({channel, handler});
   }
 }
 
-bool Bus::wait(int milliseconds) noexcept { return lcm_.handleTimeout(milliseconds) > 0; }
+/// To all that subscribed to its channel; false when nobody did, or it is not let in.
+bool Bus::handOut(const Received& message) noexcept {
+  bool let = false;
+  for (const Subscription& s : subscriptions_) {
+    if (s.channel != message.channel) continue;
+    // It is looked at once: the second time it would be a replay.
+    if (!let && !(let = lets(message, s.channel))) return false;
+    arrival_ = message.arrival;
+    s.handler(s.channel, message.data, message.size);
+  }
+  return let;
+}
+
+void Bus::drain() noexcept {
+  std::optional<Received> message;
+  for (int i = 0; receiver_ && i < kAtOnce && receiver_->read(message); ++i)
+    if (message) handOut(*message);
+}
+
+bool Bus::wait(int milliseconds) noexcept {
+  const std::int64_t until = monotonicNow() + milliseconds * 1'000'000LL;
+  std::optional<Received> message;
+  do {
+    for (int i = 0; i < kAtOnce && receiver_->read(message); ++i)
+      if (message && handOut(*message)) return true;
+  } while (receiver_->readable(until));
+  return false;
+}
 
 bool busWorks(const std::string& url) {
   const BusAddress address(url);
-  if (!hasRoute()) return false;
-  lcm::LCM lcm(address.lcm);
-  return lcm.good() && echoes(lcm);
+  try {
+    Bus bus(address.lcm);
+    return true;
+  } catch (const InputError&) {
+    return false;
+  }
 }
 
 std::string Refused::text() const {
@@ -186,17 +202,16 @@ std::string Rejections::text() const {
 }
 
 ControllerLink::ControllerLink(Bus& bus, const Identity& self) : bus_(bus), self_(self) {
-  bus.subscribe(channel::kSample, [this](const std::string&, const void* data, std::uint32_t size) {
-    receiveSample(data, size);
-  });
-  bus.subscribe(channel::kLegCommand,
+  bus.subscribe({channel::kSample}, [this](const std::string&, const void* data,
+                                           std::uint32_t size) { receiveSample(data, size); });
+  bus.subscribe({channel::kLegCommand},
                 [this](const std::string&, const void* data, std::uint32_t size) {
                   const auto message = decode<leg_command_t>(data, size);
                   if (!message) ++rejected_;
                   if (message && message->header.source != self_.source && message->engaged)
                     conflict_ = true;
                 });
-  bus.subscribe(channel::kOperator,
+  bus.subscribe({channel::kOperator},
                 [this](const std::string&, const void* data, std::uint32_t size) {
                   if (const auto message = decode<operator_t>(data, size))
                     receiveOrder(*message);
@@ -270,7 +285,7 @@ void ControllerLink::send(leg_command_t command) noexcept {
 
 PlantLink::PlantLink(Bus& bus, const std::optional<Identity>& self) : bus_(bus), self_(self) {
   bus.subscribe(
-      channel::kLegCommand, [this](const std::string&, const void* data, std::uint32_t size) {
+      {channel::kLegCommand}, [this](const std::string&, const void* data, std::uint32_t size) {
         const auto message = decode<leg_command_t>(data, size);
         const auto command = message ? fromMessage(*message) : std::nullopt;
         if (!command || !mayCommand(message->header, message->machine, command->engaged)) {
@@ -279,15 +294,16 @@ PlantLink::PlantLink(Bus& bus, const std::optional<Identity>& self) : bus_(bus),
         }
         command_ = {*command, message->header.sequence};
       });
-  bus.subscribe(channel::kRobot, [this](const std::string&, const void* data, std::uint32_t size) {
-    const auto message = decode<robot_command_t>(data, size);
-    const auto order = message ? fromMessage(*message) : std::nullopt;
-    if (!order || !means(message->machine)) {
-      ++rejected_;
-      return;
-    }
-    robot_orders_.push_back(*order);
-  });
+  bus.subscribe({channel::kRobot},
+                [this](const std::string&, const void* data, std::uint32_t size) {
+                  const auto message = decode<robot_command_t>(data, size);
+                  const auto order = message ? fromMessage(*message) : std::nullopt;
+                  if (!order || !means(message->machine)) {
+                    ++rejected_;
+                    return;
+                  }
+                  robot_orders_.push_back(*order);
+                });
 }
 
 /// A command for this machine. Without a key one that names none is for everybody.

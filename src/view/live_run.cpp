@@ -18,20 +18,21 @@ constexpr int kStopTimes = 10;                     // [-]
 }  // namespace
 
 LiveRun::LiveRun(const std::string& url) : bus_(url) {
-  bus_.subscribe("VES_(SAMPLE|STATE|TRUTH|TIMING|EXPERIMENT)",
-                 [this](const std::string& channel, const void* data, std::uint32_t size) {
-                   if (channel == channel::kState) {
-                     if (const auto m = decode<state_t>(data, size)) takeState(*m);
-                   } else if (channel == channel::kExperiment) {
-                     if (const auto m = decode<experiment_t>(data, size)) takeExperiment(*m);
-                   } else if (channel == channel::kTruth) {
-                     if (const auto m = decode<truth_t>(data, size)) rows_.add(*m);
-                   } else if (channel == channel::kSample) {
-                     if (const auto m = decode<sample_t>(data, size)) rows_.add(*m);
-                   } else if (const auto m = decode<timing_t>(data, size)) {
-                     if (m->header.source == controller_.source) rows_.add(*m);
-                   }
-                 });
+  bus_.subscribe(
+      {channel::kSample, channel::kState, channel::kTruth, channel::kTiming, channel::kExperiment},
+      [this](const std::string& channel, const void* data, std::uint32_t size) {
+        if (channel == channel::kState) {
+          if (const auto m = decode<state_t>(data, size)) takeState(*m);
+        } else if (channel == channel::kExperiment) {
+          if (const auto m = decode<experiment_t>(data, size)) takeExperiment(*m);
+        } else if (channel == channel::kTruth) {
+          if (const auto m = decode<truth_t>(data, size)) rows_.add(*m);
+        } else if (channel == channel::kSample) {
+          if (const auto m = decode<sample_t>(data, size)) rows_.add(*m);
+        } else if (const auto m = decode<timing_t>(data, size)) {
+          if (m->header.source == controller_.source) rows_.add(*m);
+        }
+      });
 }
 
 bool LiveRun::listen() {

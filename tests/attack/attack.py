@@ -302,11 +302,15 @@ def datagrams(rng):
                           b"VES_ROBOT", b"VES_TRUTH", b"VES_EXPERIMENT", b"x" * 60])
     head = b"LC02" + struct.pack(">I", rng.randrange(1 << 32))
     noise = bytes(rng.randrange(256) for _ in range(rng.choice([0, 1, 3, 8, 200, 1000])))
+
+    def part(offset, number, parts):
+        size = rng.choice([0, 100, 1200, 1 << 16, (1 << 32) - 1])
+        return b"LC03" + struct.pack(">IIIHH", rng.randrange(2), size, offset, number, parts)
     return rng.choice([
         head, head + channel, head + channel + b"\0", head + channel + b"\0" + b"abc",
         head + channel + b"\0" + noise, b"LC02", noise, head + b"\0" + noise, head + noise,
-        b"LC03" + struct.pack(">IIIHH", rng.randrange(1 << 32), rng.randrange(1 << 16),
-                              rng.randrange(1 << 16), rng.randrange(4), rng.randrange(4)) + noise])
+        part(0, 0, 3) + channel + b"\0" + noise, part(0xfffffff0, 1, 3) + noise, part(0, 0, 3)[:rng.randrange(20)],
+        part(rng.randrange(1 << 16), rng.randrange(4), rng.randrange(4)) + noise])
 
 
 def running(process):

@@ -4,6 +4,8 @@
 #pragma once
 
 #include <atomic>
+#include <condition_variable>
+#include <mutex>
 #include <string>
 #include <thread>
 
@@ -11,13 +13,14 @@
 
 namespace ves {
 
-/// Publishes VES_EXPERIMENT and VES_SETUP at once, once a second while disarmed, and when a VES_QUERY asks, at
-/// most five times a second. By a thread and a socket of its own: the control path never waits for
-/// it.
+/// Publishes VES_EXPERIMENT and VES_SETUP at once, once a second while disarmed, and when a
+/// VES_QUERY asks, at most five times a second. By a thread and a socket of its own: the control
+/// path never waits for it.
 class Announcer {
  public:
-  /// Throws InputError when the bus cannot be opened.
-  Announcer(const std::string& url, const experiment_t& experiment, const setup_t& setup);
+  /// Queries are those that `bus` hears, as long as this lives. Throws InputError when the bus
+  /// cannot be opened.
+  Announcer(Bus& bus, const std::string& url, const experiment_t& experiment, const setup_t& setup);
   ~Announcer();
   Announcer(const Announcer&) = delete;
   Announcer& operator=(const Announcer&) = delete;
@@ -32,8 +35,10 @@ class Announcer {
   Bus bus_;
   experiment_t experiment_;
   setup_t setup_;
-  bool asked_ = false;
-  std::atomic<bool> disarmed_{true}, over_{false};
+  std::atomic<bool> disarmed_{true}, asked_{false};
+  std::mutex mutex_;
+  std::condition_variable ending_;
+  bool over_ = false;
   std::thread thread_;
 };
 

@@ -7,7 +7,6 @@
 #include <cstdint>
 #include <functional>
 #include <lcm/lcm-cpp.hpp>
-#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -16,6 +15,7 @@
 #include "ves/realtime/clock_offset.hpp"
 #include "ves/transport/key.hpp"
 #include "ves/transport/messages.hpp"
+#include "ves/transport/receiver.hpp"
 
 namespace ves {
 
@@ -25,7 +25,9 @@ inline constexpr const char* kDefaultUrl = "udpm://239.255.76.67:7667?ttl=0";
 struct BusAddress {
   explicit BusAddress(const std::string& url);
 
-  std::string lcm;       // what LCM understands
+  std::string lcm;    // what LCM understands
+  std::string group;  // as "239.255.76.67"
+  std::uint16_t port = 0;
   int ttl = 0;           // [-] routers that a message may cross, and one more network
   std::string key_file;  // empty: the bus has no key
 };
@@ -64,16 +66,16 @@ class Bus {
   /// For the one message that has no fixed size.
   void publish(const std::string& channel, const experiment_t& message);
 
-  /// Every message of a channel (a regular expression), as bytes.
+  /// Every message of these channels, as bytes.
   using Handler =
       std::function<void(const std::string& channel, const void* data, std::uint32_t size)>;
-  void subscribe(const std::string& channel, Handler handler);
+  void subscribe(const std::vector<std::string>& channels, const Handler& handler);
 
-  /// Hands out all that has arrived.
+  /// Hands out what has arrived: all, unless somebody floods the bus.
   void drain() noexcept;
-  /// Readable when a message has arrived.
-  int descriptor() noexcept { return lcm_.getFileno(); }
-  /// Waits for one message; false when none came in time.
+  /// Readable when a message has arrived. After the first subscription, as wait().
+  int descriptor() const noexcept { return receiver_->descriptor(); }
+  /// Waits for one message; false when none came in time, or a signal did.
   bool wait(int milliseconds) noexcept;
 
   /// [ns] monotonic, when the message that a handler has in hand came to this host.
@@ -83,27 +85,23 @@ class Bus {
   std::int64_t failed() const noexcept { return failed_; }  // [-] messages not sent
 
  private:
-  struct Subscriber {
-    Bus& bus;
+  struct Subscription {
+    std::string channel;
     Handler handler;
-    void receive(const lcm::ReceiveBuffer* buffer, const std::string& channel);
   };
   void send(const std::string& channel, std::uint8_t* message, std::size_t size) noexcept;
-  bool lets(const std::string& channel, const void* message, std::size_t size) noexcept;
+  bool echoes();
+  bool handOut(const Received& message) noexcept;
+  bool lets(const Received& message, const std::string& channel) noexcept;
 
   BusAddress address_;
   std::optional<Key> key_;
-  lcm::LCM lcm_;
+  lcm::LCM lcm_;                      // sends
+  std::optional<Receiver> receiver_;  // who only speaks has none
+  std::vector<Subscription> subscriptions_;
   ReplayGuard guard_;
-  struct Seen {
-    const void* data = nullptr;
-    std::int64_t time = -1;  // [us]
-    bool let = false;
-  };
-  Seen seen_;
   Refused refused_;
   std::int64_t arrival_ = 0;  // [ns]
-  std::vector<std::unique_ptr<Subscriber>> subscribers_;
   std::int64_t failed_ = 0;
 };
 
