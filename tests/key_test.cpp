@@ -231,6 +231,22 @@ TEST_F(KeyedBus, CommandsAndOrdersThatAreForgedAlteredOrReplayedAreIgnored) {
   ASSERT_TRUE(link.takeCommand());
 }
 
+// Whoever looks second would take it for a replay.
+TEST_F(KeyedBus, EveryoneWhoSubscribedHearsAnOrderOnce) {
+  Bus hearer(url()), sender(url());
+  int first = 0, second = 0;
+  for (int* count : {&first, &second})
+    hearer.subscribe({channel::kOperator},
+                     [count](const std::string&, const void*, std::uint32_t) { ++*count; });
+  operator_t order{};
+  order.header = header({9, 9}, 1, 0);
+  sender.publish(channel::kOperator, order);
+  settle({&hearer});
+  EXPECT_EQ(first, 1);
+  EXPECT_EQ(second, 1);
+  EXPECT_EQ(hearer.refused().replayed, 0);
+}
+
 TEST_F(KeyedBus, TheConfigurationIsSignedTooAndReadableByAll) {
   Bus reader(url()), open(kDefaultUrl), sender(url());
   int keyed = 0, plain = 0;

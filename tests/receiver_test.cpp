@@ -162,10 +162,12 @@ TEST_F(ReceiverOnABus, OfPartsOnlyWhatIsWholeAndInOrderCounts) {
   EXPECT_TRUE(says({a, c, b}).empty());
   EXPECT_TRUE(says({b, c}).empty());
   EXPECT_TRUE(says({a, b, b, c}).empty());
-  EXPECT_TRUE(says({a, part({2, 9, 3, 1, 3}, "def"), b, c}).empty());
-  EXPECT_TRUE(says({a, part({1, 8, 3, 1, 3}, "def"), b, c}).empty());
+  for (const Part& other : {Part{2, 9, 3, 1, 3}, Part{1, 8, 3, 1, 3}}) {  // of another message
+    EXPECT_TRUE(says({a, part(other, "def"), c}).empty());
+    EXPECT_TRUE(says({a, part(other, "def"), b, c}).empty());
+  }
   EXPECT_TRUE(says({a, b, part({1, 9, 6, 2, 3}, "ghij")}).empty());
-  EXPECT_EQ(says({a, a, b, c}), good);                            // begun anew
+  EXPECT_EQ(says({part({2, 9, 0, 0, 3}, kFirst + "xyz"), a, b, c}), good);  // begun anew
   EXPECT_EQ(says({a, whole("CHANNEL", "now"), b, c}).size(), 2);  // a whole one between them
   EXPECT_TRUE(says({c}).empty());
 }
@@ -187,6 +189,22 @@ TEST_F(ReceiverOnABus, SendersDoNotMixAndManyDoNotFillTheMemory) {
   EXPECT_LE(completed, 8);
 }
 
+TEST_F(ReceiverOnABus, AMessageMayHaveFourMebibytes) {
+  const std::string piece(1 << 15, 'x');
+  for (const std::uint32_t size : {1U << 22, (1U << 22) + 1}) {
+    const std::string last(size == 1U << 22 ? 0 : 1, 'x');
+    const std::uint32_t number = size >> 15;
+    std::size_t heard_of = 0;
+    for (std::uint32_t i = 0; i < number; ++i) {
+      sender_.send(part({1, size, i << 15, i, number + 1}, (i == 0 ? kFirst : "") + piece));
+      if (i % 16 == 15) heard_of += heard().size();  // the kernel's buffer is smaller
+    }
+    sender_.send(part({1, size, number << 15, number, number + 1}, last));
+    heard_of += heard().size();
+    EXPECT_EQ(heard_of, size == 1U << 22 ? 1 : 0) << size;
+  }
+}
+
 TEST_F(ReceiverOnABus, NoiseIsNobodysAndWhatIsGoodComesThrough) {
   std::mt19937 random(2);
   const Datagram good = part({1, 40, 0, 0, 2}, kFirst + std::string(20, 'x'));
@@ -201,16 +219,19 @@ TEST_F(ReceiverOnABus, NoiseIsNobodysAndWhatIsGoodComesThrough) {
   EXPECT_EQ(heard(), std::vector<std::string>{"CHANNEL:good"});
 }
 
+// The kernel begins to stamp some time after it was asked to.
 TEST_F(ReceiverOnABus, ArrivalIsWhenItCameNotWhenItIsRead) {
-  sender_.send(whole("CHANNEL", "x"));
-  const std::int64_t sent = monotonicNow();
-  while (monotonicNow() < sent + 20'000'000) {
-  }
+  std::int64_t sent = 0;
   std::optional<Received> message;
-  ASSERT_TRUE(receiver_.read(message));
-  ASSERT_TRUE(message);
+  for (int i = 0; i < 500 && (!message || message->arrival > sent); ++i) {
+    sender_.send(whole("CHANNEL", "x"));
+    sent = monotonicNow();
+    while (monotonicNow() < sent + 2'000'000) {
+    }
+    ASSERT_TRUE(receiver_.read(message));
+    ASSERT_TRUE(message);
+  }
   EXPECT_LE(message->arrival, sent);
-  EXPECT_FALSE(receiver_.read(message));
 }
 
 TEST(Receiver, RefusesAnAddressThatIsNotOne) {

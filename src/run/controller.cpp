@@ -106,7 +106,7 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
           throw InputError(fmt::format("bus {}: no machine in lockstep answers", options.url));
         link.send(out);
         const std::int64_t until = monotonicNow() + kAnswerTime * 1'000'000LL;
-        while (link.answers() != in.tick - 1 && monotonicNow() < until) bus.wait(kAnswerTime);
+        while (link.answers() != in.tick - 1 && monotonicNow() < until) bus.waitAwake(kAnswerTime);
         if (wantsOut()) return letGo();
       }
       in.sample = link.sample();

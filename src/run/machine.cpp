@@ -86,7 +86,7 @@ void MachineProcess::inLockstep(const std::function<bool()>& stop) {
   std::int64_t start = 0;      // [ns] plant time of the controller's tick 0
   sample_t last;
   while (!stop()) {
-    bus_.wait(100);
+    bus_.waitAwake(100);
     link_.setTime(monotonicNow());
     moveRobot(true);
     const auto command = link_.takeCommand();

@@ -3,6 +3,7 @@
 
 #include <arpa/inet.h>
 #include <fmt/format.h>
+#include <sched.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -17,7 +18,14 @@ namespace ves {
 namespace {
 
 // More than wait after any stall that a run survives: a stalled controller finds the newest.
-constexpr int kAtOnce = 4096;  // [-] datagrams
+constexpr int kAtOnce = 4096;                     // [-] datagrams
+constexpr std::int64_t kMillisecond = 1'000'000;  // [ns]
+constexpr std::int64_t kAwake = 50'000;           // [ns]
+
+bool severalProcessors() noexcept {
+  cpu_set_t ours;
+  return sched_getaffinity(0, sizeof ours, &ours) == 0 && CPU_COUNT(&ours) > 1;
+}
 
 /// True when the kernel knows where multicast should go; LCM prints a page when it does not.
 bool hasRoute() {
@@ -89,7 +97,8 @@ std::string openBusWarning(const std::string& url) {
       url);
 }
 
-Bus::Bus(const std::string& url) : address_(url), lcm_(reachable(address_)) {
+Bus::Bus(const std::string& url)
+    : address_(url), lcm_(reachable(address_)), several_processors_(severalProcessors()) {
   if (!address_.key_file.empty()) key_.emplace(address_.key_file);
   if (!lcm_.good()) throw InputError(fmt::format("--url {}: not a bus that LCM can open", url));
   if (!echoes()) refuse(url);
@@ -165,12 +174,20 @@ void Bus::drain() noexcept {
 }
 
 bool Bus::wait(int milliseconds) noexcept {
-  const std::int64_t until = monotonicNow() + milliseconds * 1'000'000LL;
+  return waitUntil(monotonicNow() + milliseconds * kMillisecond, 0);
+}
+
+bool Bus::waitAwake(int milliseconds) noexcept {
+  const std::int64_t now = monotonicNow();
+  return waitUntil(now + milliseconds * kMillisecond, several_processors_ ? now + kAwake : 0);
+}
+
+bool Bus::waitUntil(std::int64_t until, std::int64_t awake) noexcept {
   std::optional<Received> message;
   do {
     for (int i = 0; i < kAtOnce && receiver_->read(message); ++i)
       if (message && handOut(*message)) return true;
-  } while (receiver_->readable(until));
+  } while (monotonicNow() < awake || receiver_->readable(until));
   return false;
 }
 

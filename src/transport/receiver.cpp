@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 #include <linux/filter.h>
 #include <poll.h>
-#include <sched.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -33,8 +32,6 @@ constexpr std::size_t kSenders = 8;              // [-] messages in parts at a t
 // A second of everything on the bus, as ./ves doctor asks of net.core.rmem_max; beyond that it
 // takes privileges.
 constexpr int kKernelBuffer = 2 << 20;  // [bytes]
-// In lockstep the answer is there before a processor has gone to sleep and been woken.
-constexpr std::int64_t kAwake = 50'000;  // [ns]
 
 std::uint32_t word(const std::uint8_t* bytes) noexcept {
   return std::uint32_t{bytes[0]} << 24 | std::uint32_t{bytes[1]} << 16 |
@@ -86,11 +83,6 @@ std::vector<sock_filter> filter(const std::vector<std::string>& channels) {
   return program;
 }
 
-bool severalProcessors() noexcept {
-  cpu_set_t ours;
-  return sched_getaffinity(0, sizeof ours, &ours) == 0 && CPU_COUNT(&ours) > 1;
-}
-
 /// [ns] monotonic. Where the kernel does not say: now.
 std::int64_t arrivalOf(msghdr& header) noexcept {
   const std::int64_t now = monotonicNow();
@@ -107,8 +99,7 @@ std::int64_t arrivalOf(msghdr& header) noexcept {
 
 }  // namespace
 
-Receiver::Receiver(const std::string& address, std::uint16_t port)
-    : several_processors_(severalProcessors()), datagram_(kLongestDatagram) {
+Receiver::Receiver(const std::string& address, std::uint16_t port) : datagram_(kLongestDatagram) {
   parts_.reserve(kSenders + 1);
   sockaddr_in group{};
   group.sin_family = AF_INET;
@@ -148,14 +139,10 @@ bool Receiver::hears(std::string_view channel) const noexcept {
 }
 
 bool Receiver::readable(std::int64_t until) const noexcept {
-  std::int64_t now = monotonicNow();
+  const std::int64_t left = until - monotonicNow();
+  if (left <= 0) return false;
   pollfd socket{fd_, POLLIN, 0};
-  // Asleep at once where there is one processor: the other side needs it.
-  const std::int64_t awake = several_processors_ ? std::min(until, now + kAwake) : now;
-  for (; now < awake; now = monotonicNow())
-    if (poll(&socket, 1, 0) > 0) return true;
-  if (now >= until) return false;
-  const timespec patience{(until - now) / 1'000'000'000, (until - now) % 1'000'000'000};
+  const timespec patience{left / 1'000'000'000, left % 1'000'000'000};
   return ppoll(&socket, 1, &patience, nullptr) > 0;
 }
 

@@ -77,6 +77,9 @@ class Bus {
   int descriptor() const noexcept { return receiver_->descriptor(); }
   /// Waits for one message; false when none came in time, or a signal did.
   bool wait(int milliseconds) noexcept;
+  /// The same, for an answer that may come within microseconds: awake for the first 50, where there
+  /// are several processors. To fall asleep and be woken takes longer.
+  bool waitAwake(int milliseconds) noexcept;
 
   /// [ns] monotonic, when the message that a handler has in hand came to this host.
   std::int64_t arrival() const noexcept { return arrival_; }
@@ -91,6 +94,7 @@ class Bus {
   };
   void send(const std::string& channel, std::uint8_t* message, std::size_t size) noexcept;
   bool echoes();
+  bool waitUntil(std::int64_t until, std::int64_t awake) noexcept;
   bool handOut(const Received& message) noexcept;
   bool lets(const Received& message, const std::string& channel) noexcept;
 
@@ -103,6 +107,7 @@ class Bus {
   Refused refused_;
   std::int64_t arrival_ = 0;  // [ns]
   std::int64_t failed_ = 0;
+  bool several_processors_;  // are ours
 };
 
 /// True when multicast messages of this machine reach this machine.

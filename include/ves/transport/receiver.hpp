@@ -60,7 +60,6 @@ class Receiver {
   bool hears(std::string_view channel) const noexcept;
 
   int fd_ = -1;
-  const bool several_processors_;  // are ours
   std::vector<std::string> channels_;
   std::vector<std::uint8_t> datagram_;
   std::vector<Parts> parts_;  // one of a sender, the newest last
