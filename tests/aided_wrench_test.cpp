@@ -11,6 +11,7 @@
 
 #include "support/rig.hpp"
 #include "ves/control/gravity_compensation.hpp"
+#include "ves/math/dense.hpp"
 
 namespace ves {
 namespace {
@@ -239,12 +240,12 @@ TEST(AidedWrench, KnowsWhatRoundedLegsMakeOfWeightAndInertia) {
                                                    : JointVector(JointVector::Zero());
   const Wrench F_So_S = staticWrench(c.payload, q, X_IP.R, c.gravity);
   AdcCounts adc{};
-  const Vec6 counts = c.sensor.C_proc.inverse() * F_So_S.stacked();
+  const Vec6 counts = inverse(c.sensor.C_proc) * F_So_S.stacked();
   const auto left = [&](const Transform& believed) -> Vec6 {  // [count]
     const Wrench F = rotate(believed.R, transfer(c.sensor.X_PS, F_So_S)) -
                      gravityCompensation(c.payload, believed.R,
                                          staticWrench(c.payload, q, believed.R, c.gravity));
-    return c.sensor.C_proc.inverse() *
+    return inverse(c.sensor.C_proc) *
            transfer(inverse(c.sensor.X_PS), rotate(X_IP.R.transpose(), F)).stacked();
   };
   const RigidBody robot =
@@ -265,7 +266,7 @@ TEST(AidedWrench, KnowsWhatRoundedLegsMakeOfWeightAndInertia) {
     twist /= 2.0 * kStep;
     const double K = std::max(c.servo.extend(i), c.servo.retract(i)) * c.servo.readings.scale(i);
     const Wrench inertial = Wrench::from(M_1 * twist);
-    legs += (K * (c.sensor.C_proc.inverse() *
+    legs += (K * (inverse(c.sensor.C_proc) *
                   transfer(inverse(c.sensor.X_PS), rotate(X_IP.R.transpose(), inertial)).stacked()))
                 .cwiseAbs2();
   }

@@ -50,7 +50,8 @@ Mat6 body() {
 VectorXd exact(const ModalModel& m, const Mat6& M, const VectorXd& state, const Vec6& F,
                double time) {
   const Eigen::Index k = m.stiffness.size();
-  const MatrixXd A_inverse = (MatrixXd::Identity(k, k) + m.Phi.transpose() * M * m.Phi).inverse();
+  const MatrixXd I = MatrixXd::Identity(k, k);
+  const MatrixXd A_inverse = solvePositive(I + m.Phi.transpose() * M * m.Phi, I);
   MatrixXd S = MatrixXd::Zero(2 * k + 1, 2 * k + 1);
   S.block(0, k, k, k).setIdentity();
   S.block(k, 0, k, k) = -A_inverse * m.stiffness.asDiagonal();
@@ -170,10 +171,9 @@ TEST(Ahead, MotionIsThatMuchLaterUnderTheSameWrench) {
       ASSERT_LT((model.motion().x - m.Phi * later.head(6)).norm(), 1e-13);
       ASSERT_LT((model.motion().x_dot - m.Phi * later.tail(6)).norm(), 1e-12);
       const VectorXd eta_ddot =
-          (MatrixXd::Identity(6, 6) + m.Phi.transpose() * body() * m.Phi)
-              .ldlt()
-              .solve(m.Phi.transpose() * F - m.stiffness.cwiseProduct(later.head(6)) -
-                     m.damping * later.tail(6));
+          solvePositive(MatrixXd::Identity(6, 6) + m.Phi.transpose() * body() * m.Phi,
+                        m.Phi.transpose() * F - m.stiffness.cwiseProduct(later.head(6)) -
+                            m.damping * later.tail(6));
       ASSERT_LT((model.motion().x_ddot - m.Phi * eta_ddot).norm(), 1e-10);
     }
   }

@@ -15,6 +15,7 @@
 #include "ves/config/servo.hpp"
 #include "ves/identification/sensor_timing.hpp"
 #include "ves/identification/servo_identification.hpp"
+#include "ves/math/dense.hpp"
 #include "ves/results/comparison.hpp"
 #include "ves/run/run.hpp"
 
@@ -100,7 +101,7 @@ double share(const Experiment& e, const Series& series) {
   options.model = InteractionModel::kWhole;
   options.duration = duration;
   const Vec6 start = commanded(series).x.front();
-  options.eta = interaction.base.Phi.completeOrthogonalDecomposition().solve(start);
+  options.eta = leastSquares(interaction.base.Phi, start);
   options.eta_dot = VectorXd::Zero(options.eta.size());
   Motion truth = motion(simulate(interaction, options));
   for (Vec6& x : truth.x) x += start - interaction.base.Phi * options.eta;

@@ -143,7 +143,7 @@ class HoldOracle {
  public:
   HoldOracle(const Mat6& M, const Mat6& C, const Mat6& K, double T) {
     Eigen::Matrix<double, 18, 18> A = Eigen::Matrix<double, 18, 18>::Zero();
-    const Mat6 inverse = M.inverse();
+    const Mat6 inverse = ves::inverse(M);
     A.block<6, 6>(0, 6).setIdentity();
     A.block<6, 6>(6, 0) = -inverse * K;
     A.block<6, 6>(6, 6) = -inverse * C;
@@ -206,7 +206,7 @@ TEST_P(Admittance, StepsAsTheMatrixExponential) {
     const double scale = 1.0 + oracle.x.norm();
     ASSERT_LT((model.motion().x - oracle.x).norm(), 1e-10 * scale) << "step " << i;
     ASSERT_LT((model.motion().x_dot - oracle.x_dot).norm(), 1e-9 * scale) << "step " << i;
-    const Vec6 acceleration = M.inverse() * (W - C * oracle.x_dot - K * oracle.x);  // (C.7)
+    const Vec6 acceleration = inverse(M) * (W - C * oracle.x_dot - K * oracle.x);  // (C.7)
     ASSERT_LT((model.motion().x_ddot - acceleration).norm(), 1e-7 * scale) << "step " << i;
   }
 }

@@ -23,13 +23,18 @@ PERIOD = 0.01  # [s]
 STOP = 2       # operator_t.request
 
 
+# Ten seconds.
+SHORT = ["--set", "program=[{move: {}}, {calibration: {}}, {admittance: {duration_s: 6}, robot: "
+         "[{at_s: 1, duration_s: 2, joint: joint_2, to_deg_or_m: -60}]}]"]
+
+
 class Run:
     """A run with a view beside it."""
 
-    def __init__(self, out, scenario="puma_on_table_4_1"):
+    def __init__(self, out, *arguments):
         self.out = pathlib.Path(out)
-        self.process = support.ves("run", scenario, "--view", "--private-bus", "--no-plots", "--quiet",
-                                   "--out", out, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        self.process = support.ves("run", "puma_on_table_4_1", "--view", "--private-bus", "--no-plots", "--quiet",
+                                   "--out", out, *arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         self.url = re.search(r"http://\S+", self.process.stdout.readline()).group(0)
 
     def wait(self):
@@ -78,12 +83,12 @@ class Live(support.Page):
         self.until("window.ves !== undefined && ves.count > 1")
 
     def test_draws_what_happens(self):
-        run = Run(self.out / "live")
+        run = Run(self.out / "live", *SHORT)
         self.open(run)
         home = self.ask("ves.live.home")
         seen = []
         names = ["platform", "tool", "link1", "link3", "link6"]
-        for t in (3.0, 6.0, 12.0):
+        for t in (3.0, 5.0, 7.0):
             self.until(f"ves.time() > {t}")
             seen.append(self.ask("[ves.time(), ves.live.head[2]].concat(arguments[0].map(ves.matrix))", names))
             self.shot(f"live_{t:.0f}")
@@ -113,11 +118,11 @@ class Live(support.Page):
         self.assertEqual(len({(source, sequence) for source, sequence, _ in orders}), 1)
 
     def test_who_is_slow_sees_what_is_new(self):
-        run = Run(self.out / "slow")
+        run = Run(self.out / "slow", *SHORT)
         slow, quick = self.frames(run), self.frames(run)
         quick.take()
         slow.take()
-        end = time.monotonic() + 10.0
+        end = time.monotonic() + 4.0
         while time.monotonic() < end:  # one of them pauses
             quick.take()
         slow.take()  # what waited on the way
