@@ -149,14 +149,7 @@ bool NetFt::read(WrenchReading& out) noexcept {
     if (got < 0 && errno == EINTR) continue;
     if (got < 0 && errno == ECONNREFUSED) continue;  // of an earlier request; it is taken off
     if (got < 0) break;
-    std::int64_t came = now;
-    for (cmsghdr* c = CMSG_FIRSTHDR(&message); c; c = CMSG_NXTHDR(&message, c)) {
-      if (c->cmsg_level != SOL_SOCKET || c->cmsg_type != SCM_TIMESTAMPNS) continue;
-      timespec stamp;
-      std::memcpy(&stamp, CMSG_DATA(c), sizeof stamp);
-      const std::int64_t at = stamp.tv_sec * 1'000'000'000LL + stamp.tv_nsec - behind;
-      if (at <= now && now - at < kSilence) came = at;
-    }
+    const std::int64_t came = arrivalOf(message, now, behind, kSilence);
     const std::int64_t before = stream_.counters().records;
     stream_.take(data, static_cast<std::size_t>(got), came);
     if (stream_.counters().records > before) heard_ = now;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "ves/base/big_endian.hpp"
 #include "ves/base/errors.hpp"
 
 namespace ves::devices {
@@ -14,10 +15,7 @@ namespace {
 
 constexpr std::uint16_t kRequest = 0x1234;
 
-std::uint32_t big32(const std::uint8_t* at) {
-  return static_cast<std::uint32_t>(at[0]) << 24 | static_cast<std::uint32_t>(at[1]) << 16 |
-         static_cast<std::uint32_t>(at[2]) << 8 | static_cast<std::uint32_t>(at[3]);
-}
+std::uint32_t big32(const std::uint8_t* at) { return static_cast<std::uint32_t>(bigEndian(at, 4)); }
 
 void putBig(std::uint8_t* at, std::uint32_t value, int bytes) {
   for (int i = 0; i < bytes; ++i) at[i] = static_cast<std::uint8_t>(value >> (8 * (bytes - 1 - i)));

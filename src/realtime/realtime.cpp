@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <sched.h>
 #include <sys/mman.h>
+#include <sys/socket.h>
 #include <time.h>
 
 #include <cerrno>
@@ -35,6 +36,18 @@ std::int64_t wallNow() noexcept {
   timespec now;
   clock_gettime(CLOCK_REALTIME, &now);
   return now.tv_sec * kSecond + now.tv_nsec;
+}
+
+std::int64_t arrivalOf(msghdr& message, std::int64_t now, std::int64_t behind,
+                       std::int64_t longest) noexcept {
+  for (cmsghdr* c = CMSG_FIRSTHDR(&message); c; c = CMSG_NXTHDR(&message, c)) {
+    if (c->cmsg_level != SOL_SOCKET || c->cmsg_type != SCM_TIMESTAMPNS) continue;
+    timespec stamp;
+    std::memcpy(&stamp, CMSG_DATA(c), sizeof stamp);
+    const std::int64_t at = stamp.tv_sec * kSecond + stamp.tv_nsec - behind;
+    if (at <= now && now - at < longest) return at;
+  }
+  return now;
 }
 
 std::int64_t Ticker::wait() noexcept {

@@ -27,12 +27,13 @@ std::string data(const Line& line) {
   return out;
 }
 
-std::pair<double, double> range(const Panel& panel) {
+/// Of x or y over all lines.
+std::pair<double, double> range(const Panel& panel, std::vector<double> Line::*values) {
   double low = HUGE_VAL, high = -HUGE_VAL;
   for (const Line& line : panel.lines)
-    for (const double y : line.y) {
-      low = std::min(low, y);
-      high = std::max(high, y);
+    for (const double value : line.*values) {
+      low = std::min(low, value);
+      high = std::max(high, value);
     }
   return low <= high ? std::pair(low, high) : std::pair(0.0, 0.0);
 }
@@ -72,15 +73,10 @@ std::string svg(const std::vector<Panel>& panels) {
     script += fmt::format("{}\nset xlabel {}\nset ylabel {}\n",
                           panel.log_x ? "set logscale x\nset autoscale xfix" : "unset logscale x",
                           quoted(panel.x_label), quoted(panel.y_label));
-    const auto [low, high] = range(panel);
+    const auto [low, high] = range(panel, &Line::y);
     const double span = high > low ? high - low : 1.0;  // room for the key above
     script += fmt::format("set yrange [{}:{}]\n", low - 0.05 * span, high + 0.16 * span);
-    double from = HUGE_VAL, to = -HUGE_VAL;
-    for (const Line& line : panel.lines)
-      for (const double x : line.x) {
-        from = std::min(from, x);
-        to = std::max(to, x);
-      }
+    const auto [from, to] = range(panel, &Line::x);
     script += markLines(panel.marks, from, to);
     std::string plot;
     for (std::size_t i = 0; i < panel.lines.size(); ++i) {

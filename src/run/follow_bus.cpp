@@ -16,17 +16,16 @@ bool followBus(const std::string& url, const std::function<bool()>& stop,
   std::optional<Identity> controller;
   bool described = false;
   std::int64_t heard = 0, asked = 0, queries = 0;  // [ns], [ns], [-]
-  bus.subscribe({channel::kSample, channel::kLegCommand, channel::kState, channel::kTruth,
-                 channel::kTiming, channel::kRobot, channel::kOperator, channel::kExperiment},
-                [&](const std::string& from, const void* data, std::uint32_t size) {
-                  if (from == channel::kExperiment) {
-                    const auto m = decode<experiment_t>(data, size);
-                    if (!m || described || !controller || m->header.source != controller->source)
-                      return;
-                    described = true;
-                    begin(*m);
+  bus.subscribe({channel::kExperiment},
+                [&](const std::string&, const void* data, std::uint32_t size) {
+                  const auto m = decode<experiment_t>(data, size);
+                  if (!m || described || !controller || m->header.source != controller->source)
                     return;
-                  }
+                  described = true;
+                  begin(*m);
+                });
+  bus.subscribe(channel::kRecorded,
+                [&](const std::string& from, const void* data, std::uint32_t size) {
                   if (!wellFormed(from, data, size)) return;
                   if (from == channel::kState) {
                     const auto m = decode<state_t>(data, size);

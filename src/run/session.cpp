@@ -25,11 +25,8 @@ Session::Session(const Experiment& experiment, const LaunchOptions& options)
     log_ = std::make_unique<LogWriter>(process.log);
     log_->write(channel::kExperiment, describe(experiment, {}, 0), wallNow());
   }
-  bus_.subscribe({channel::kSample, channel::kLegCommand, channel::kState, channel::kTruth,
-                  channel::kTiming, channel::kRobot, channel::kOperator},
-                 [this](const std::string& channel, const void* data, std::uint32_t size) {
-                   receive(channel, data, size);
-                 });
+  bus_.subscribe(channel::kRecorded, [this](const std::string& channel, const void* data,
+                                            std::uint32_t size) { receive(channel, data, size); });
   std::vector<std::string> shared = {"plant", options.scenario.string(), "--url", process.url};
   if (process.lockstep) shared.push_back("--lockstep");
   if (process.realtime) shared.push_back("--realtime");

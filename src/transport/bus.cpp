@@ -160,7 +160,8 @@ bool Bus::handOut(const Received& message) noexcept {
   for (const Subscription& s : subscriptions_) {
     if (s.channel != message.channel) continue;
     // It is looked at once: the second time it would be a replay.
-    if (!let && !(let = lets(message, s.channel))) return false;
+    let = let || lets(message, s.channel);
+    if (!let) return false;
     arrival_ = message.arrival;
     s.handler(s.channel, message.data, message.size);
   }

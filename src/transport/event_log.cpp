@@ -11,6 +11,7 @@
 #include <cstring>
 #include <filesystem>
 
+#include "ves/base/big_endian.hpp"
 #include "ves/base/errors.hpp"
 
 namespace ves {
@@ -23,12 +24,6 @@ constexpr std::uint32_t kMaxData = 16u << 20;      // [B] far above any message 
 constexpr std::size_t kBuffer = 1u << 16;          // [B]
 constexpr std::size_t kRoom = 4096;                // [B] of it for one more message
 constexpr std::int64_t kFlushAfter = 500'000'000;  // [ns]
-
-std::uint64_t bigEndian(const std::uint8_t* bytes, int n) {
-  std::uint64_t x = 0;
-  for (int i = 0; i < n; ++i) x = x << 8 | bytes[i];
-  return x;
-}
 
 void put(std::vector<std::uint8_t>& to, std::uint64_t value, int bytes) {
   for (int i = bytes - 1; i >= 0; --i) to.push_back(static_cast<std::uint8_t>(value >> (8 * i)));

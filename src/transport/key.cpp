@@ -12,6 +12,7 @@
 #include <functional>
 #include <iterator>
 
+#include "ves/base/big_endian.hpp"
 #include "ves/base/errors.hpp"
 #include "ves/transport/channels.hpp"
 
@@ -23,9 +24,7 @@ constexpr std::size_t kSequenceAt = 16, kSourceAt = 24, kEpochAt = 32, kSignatur
 constexpr std::size_t kShortest = 56;
 
 std::int64_t numberAt(const std::uint8_t* message, std::size_t at) {
-  std::uint64_t number = 0;
-  for (std::size_t i = 0; i < 8; ++i) number = number << 8 | message[at + i];
-  return static_cast<std::int64_t>(number);
+  return static_cast<std::int64_t>(bigEndian(message + at, 8));
 }
 
 }  // namespace

@@ -15,6 +15,7 @@
 #include <ctime>
 #include <utility>
 
+#include "ves/base/big_endian.hpp"
 #include "ves/base/errors.hpp"
 #include "ves/realtime/realtime.hpp"
 
@@ -31,11 +32,11 @@ constexpr std::size_t kLongestDatagram = 65536;  // [bytes]
 constexpr std::size_t kSenders = 8;              // [-] messages in parts at a time
 // A second of everything on the bus, as ./ves doctor asks of net.core.rmem_max; beyond that it
 // takes privileges.
-constexpr int kKernelBuffer = 2 << 20;  // [bytes]
+constexpr int kKernelBuffer = 2 << 20;                 // [bytes]
+constexpr std::int64_t kLongestWait = 10'000'000'000;  // [ns] in the kernel's buffer
 
 std::uint32_t word(const std::uint8_t* bytes) noexcept {
-  return std::uint32_t{bytes[0]} << 24 | std::uint32_t{bytes[1]} << 16 |
-         std::uint32_t{bytes[2]} << 8 | bytes[3];
+  return static_cast<std::uint32_t>(bigEndian(bytes, 4));
 }
 
 /// The channel's name at the beginning of `bytes`, which ends with a zero; none when it does not.
@@ -81,20 +82,6 @@ std::vector<sock_filter> filter(const std::vector<std::string>& channels) {
   }
   add(BPF_RET | BPF_K, kDrop);
   return program;
-}
-
-/// [ns] monotonic. Where the kernel does not say: now.
-std::int64_t arrivalOf(msghdr& header) noexcept {
-  const std::int64_t now = monotonicNow();
-  for (cmsghdr* c = CMSG_FIRSTHDR(&header); c; c = CMSG_NXTHDR(&header, c)) {
-    if (c->cmsg_level != SOL_SOCKET || c->cmsg_type != SCM_TIMESTAMPNS) continue;
-    timespec wall;
-    std::memcpy(&wall, CMSG_DATA(c), sizeof wall);
-    const std::int64_t waited = wallNow() - (wall.tv_sec * 1'000'000'000 + wall.tv_nsec);
-    constexpr std::int64_t kLongestWait = 10'000'000'000;  // [ns]; more: the wall clock was set
-    if (waited > 0 && waited < kLongestWait) return now - waited;
-  }
-  return now;
 }
 
 }  // namespace
@@ -166,7 +153,10 @@ bool Receiver::read(std::optional<Received>& message) noexcept {
   if (magic == kWhole) message = whole(size);
   if (magic == kPart)
     message = part(size, std::uint64_t{from.sin_addr.s_addr} << 16 | from.sin_port);
-  if (message) message->arrival = arrivalOf(header);
+  if (message) {
+    const std::int64_t now = monotonicNow();
+    message->arrival = arrivalOf(header, now, wallNow() - now, kLongestWait);
+  }
   return true;
 }
 

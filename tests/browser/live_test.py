@@ -23,7 +23,7 @@ PERIOD = 0.01  # [s]
 STOP = 2       # operator_t.request
 
 
-# Ten seconds.
+# A program of ten seconds.
 SHORT = ["--set", "program=[{move: {}}, {calibration: {}}, {admittance: {duration_s: 6}, robot: "
          "[{at_s: 1, duration_s: 2, joint: joint_2, to_deg_or_m: -60}]}]"]
 

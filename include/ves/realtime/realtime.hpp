@@ -5,6 +5,8 @@
 
 #include <cstdint>
 
+struct msghdr;
+
 namespace ves {
 
 /// CLOCK_MONOTONIC: no clock step reaches it.
@@ -12,6 +14,12 @@ std::int64_t monotonicNow() noexcept;  // [ns]
 
 /// Since 1970, as logs are stamped.
 std::int64_t wallNow() noexcept;  // [ns]
+
+/// When a datagram came [ns, monotonic], by the kernel's stamp (SO_TIMESTAMPNS). `now` where it has
+/// none, or none of the last `longest` before `now`: then somebody set the wall clock. `behind` is
+/// wallNow() - monotonicNow().
+std::int64_t arrivalOf(msghdr& message, std::int64_t now, std::int64_t behind,
+                       std::int64_t longest) noexcept;
 
 /// An absolute schedule. A missed deadline is counted and skipped, never made up; the phase stays.
 class Ticker {

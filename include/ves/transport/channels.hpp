@@ -4,6 +4,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 namespace ves::channel {
 
@@ -22,5 +23,9 @@ inline const std::string kOperator = "VES_OPERATOR";
 inline const std::string kQuery = "VES_QUERY";
 inline const std::string kSetup = "VES_SETUP";
 inline const std::string kExperiment = "VES_EXPERIMENT";
+
+/// What a recording of a run has, besides VES_EXPERIMENT at its beginning.
+inline const std::vector<std::string> kRecorded = {kSample, kLegCommand, kState,   kTruth,
+                                                   kTiming, kRobot,      kOperator};
 
 }  // namespace ves::channel
