@@ -7,13 +7,14 @@
 #include "support/momentum.hpp"
 #include "support/poses.hpp"
 #include "support/robots.hpp"
+#include "support/trees.hpp"
 #include "ves/planning/joint_paths.hpp"
 #include "ves/robot/newton_euler.hpp"
 
 namespace ves {
 namespace {
 
-constexpr double kG = 9.81;
+using test::kG;
 
 /// Joints that swing, each its own way, with exact derivatives.
 JointState jointSwing(int joints, double t) {

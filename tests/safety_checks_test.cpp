@@ -14,7 +14,7 @@
 namespace ves {
 namespace {
 
-constexpr double kT = 0.01;  // [s]
+constexpr double kPeriod = 0.01;  // [s]
 
 using test::experiment;
 using test::kNan;
@@ -30,12 +30,12 @@ class SafetyChecks : public testing::Test {
 TEST_F(SafetyChecks, Velocity) {
   for (int i = 0; i < 6; ++i) {
     for (double sign : {-1.0, 1.0}) {
-      EXPECT_TRUE(
-          velocityCheck(l_, L_ + sign * 0.999 * l_.leg_velocity * kT * Vec6::Unit(i), L_, kT));
-      EXPECT_FALSE(
-          velocityCheck(l_, L_ + sign * 1.001 * l_.leg_velocity * kT * Vec6::Unit(i), L_, kT));
+      EXPECT_TRUE(velocityCheck(l_, L_ + sign * 0.999 * l_.leg_velocity * kPeriod * Vec6::Unit(i),
+                                L_, kPeriod));
+      EXPECT_FALSE(velocityCheck(l_, L_ + sign * 1.001 * l_.leg_velocity * kPeriod * Vec6::Unit(i),
+                                 L_, kPeriod));
     }
-    EXPECT_FALSE(velocityCheck(l_, L_ + kNan * Vec6::Unit(i), L_, kT));
+    EXPECT_FALSE(velocityCheck(l_, L_ + kNan * Vec6::Unit(i), L_, kPeriod));
   }
 }
 
@@ -78,13 +78,14 @@ TEST_F(SafetyChecks, ActuatorLimits) {
 }
 
 TEST_F(SafetyChecks, FlowLimits) {
-  const double extend = l_.flow / l_.bore_area * kT, retract = l_.flow / l_.rod_side_area * kT;
+  const double extend = l_.flow / l_.bore_area * kPeriod,
+               retract = l_.flow / l_.rod_side_area * kPeriod;
   for (int i = 0; i < 6; ++i) {
-    EXPECT_TRUE(flowLimitsCheck(l_, L_ + 0.999 * extend * Vec6::Unit(i), L_, kT));
-    EXPECT_FALSE(flowLimitsCheck(l_, L_ + 1.001 * extend * Vec6::Unit(i), L_, kT));
-    EXPECT_TRUE(flowLimitsCheck(l_, L_ - 0.999 * retract * Vec6::Unit(i), L_, kT));
-    EXPECT_FALSE(flowLimitsCheck(l_, L_ - 1.001 * retract * Vec6::Unit(i), L_, kT));
-    EXPECT_FALSE(flowLimitsCheck(l_, L_ + kNan * Vec6::Unit(i), L_, kT));
+    EXPECT_TRUE(flowLimitsCheck(l_, L_ + 0.999 * extend * Vec6::Unit(i), L_, kPeriod));
+    EXPECT_FALSE(flowLimitsCheck(l_, L_ + 1.001 * extend * Vec6::Unit(i), L_, kPeriod));
+    EXPECT_TRUE(flowLimitsCheck(l_, L_ - 0.999 * retract * Vec6::Unit(i), L_, kPeriod));
+    EXPECT_FALSE(flowLimitsCheck(l_, L_ - 1.001 * retract * Vec6::Unit(i), L_, kPeriod));
+    EXPECT_FALSE(flowLimitsCheck(l_, L_ + kNan * Vec6::Unit(i), L_, kPeriod));
   }
 }
 
@@ -221,7 +222,7 @@ TEST(SafetyMonitor, NothingThatIsNotFinitePasses) {
   const auto finite = [&](const Proposal& p, const Sample& sample, const Wrench& dynamic) {
     SampleStream samples(c.period);
     samples.update(sample, 0, false, false);
-    const SafetyMonitor monitor(c.safety, c.geometry, kT);
+    const SafetyMonitor monitor(c.safety, c.geometry, kPeriod);
     return !monitor
                 .check(p, {good.legs.L, good.legs.L}, samples, LegEstimator(c), dynamic,
                        Oscillation(), false)

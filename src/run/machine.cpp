@@ -10,9 +10,9 @@
 namespace ves {
 namespace {
 
-constexpr int kMachinePriority = 70;                 // [-] SCHED_FIFO
-constexpr std::int64_t kLongestLeap = 100'000'000;   // [-] ticks that a command may pass over
-constexpr std::int64_t kWorthAWord = 2'000'000'000;  // [ns]
+constexpr int kMachinePriority = 70;                // [-] SCHED_FIFO
+constexpr std::int64_t kLongestLeap = 100'000'000;  // [-] ticks that a command may pass over
+constexpr std::int64_t kToldAfter = 2'000'000'000;  // [ns]
 
 /// The machine on its bus.
 class MachineProcess {
@@ -129,7 +129,7 @@ void MachineProcess::inRealTime(const std::function<bool()>& stop) {
     machine_.advance(now - start, now);
     if (machine_.waitsFor().empty()) {
       publish(-1);
-    } else if (now - start > kWorthAWord && !std::exchange(told, true)) {
+    } else if (now - start > kToldAfter && !std::exchange(told, true)) {
       fmt::print(stderr, "plant: waiting for {} on {}\n", machine_.waitsFor(), options_.url);
     }
   }

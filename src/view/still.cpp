@@ -103,7 +103,7 @@ std::string svg(const std::vector<Drawing>& drawings, double seconds) {
 }
 
 constexpr const char* kMetal = "#8d99a6";
-constexpr const char* kPlate = "#6b7885";
+constexpr const char* kPlates = "#6b7885";
 constexpr const char* kRobot = "#e0903a";
 constexpr const char* kArm = "#b9a878";
 
@@ -127,7 +127,7 @@ Drawing drawn(const Scene& scene, const std::vector<float>& picture, StillView v
       std::vector<Vec3> corners;
       for (const Json& c : shape["corners"])
         corners.push_back(X * Vec3(number(c[0]), number(c[1]), number(shape["top"])));
-      drawing.polygon(corners, kPlate);
+      drawing.polygon(corners, kPlates);
     } else if (kind == "cylinder") {
       const Vec3 from = shape.contains("from") ? point(shape["from"]) : Vec3(Vec3::Zero());
       drawing.stroke(X * from, X * Vec3(from + Vec3(0.0, 0.0, number(shape["length"]))),

@@ -23,7 +23,7 @@
 namespace ves {
 namespace {
 
-constexpr std::size_t kChunk = 16384;      // [B]
+constexpr std::size_t kPiece = 16384;      // [B]
 constexpr std::size_t kPacket = 1u << 20;  // [B] written at once; by default as little as is read
 
 std::string newToken() {
@@ -239,7 +239,7 @@ class WebServer::Impl {
   }
 
   int sendPage(lws* wsi, Download& download) {
-    const std::size_t n = std::min(kChunk, page_.size() - download.sent);
+    const std::size_t n = std::min(kPiece, page_.size() - download.sent);
     std::vector<unsigned char> buffer(LWS_PRE + n);
     std::memcpy(buffer.data() + LWS_PRE, page_.data() + download.sent, n);
     download.sent += n;
