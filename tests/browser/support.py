@@ -4,8 +4,10 @@ import argparse
 import base64
 import csv
 import importlib
+import json
 import os
 import pathlib
+import re
 import socket
 import struct
 import subprocess
@@ -53,6 +55,40 @@ def rows(folder, key):
     """series.csv by a column's numbers."""
     with open(pathlib.Path(folder) / "series.csv") as file:
         return {round(float(row[key]), 6): row for row in csv.DictReader(file)}
+
+
+# A program of ten seconds.
+SHORT = ["--set", "program=[{move: {}}, {calibration: {}}, {admittance: {duration_s: 6}, robot: "
+         "[{at_s: 1, duration_s: 2, joint: joint_2, to_deg_or_m: -60}]}]"]
+
+
+class Run:
+    """A run with a view beside it."""
+
+    def __init__(self, out, *arguments):
+        self.out = pathlib.Path(out)
+        self.process = ves("run", "puma_on_table_4_1", "--view", "--private-bus", "--no-plots", "--quiet",
+                           "--out", out, *arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        self.url = re.search(r"http://\S+", self.process.stdout.readline()).group(0)
+
+    def wait(self):
+        _, self.said = self.process.communicate(timeout=120)
+        return self.process.returncode
+
+    def summary(self):
+        return json.loads((self.out / "summary.json").read_text())
+
+    def orders(self):
+        """(source, sequence, request) of every operator_t in the log."""
+        data, at, out = (self.out / "run.lcmlog").read_bytes(), 0, []
+        while at + 28 <= len(data):
+            _, _, _, channel, size = struct.unpack(">IqqII", data[at:at + 28])
+            name, body = data[at + 28:at + 28 + channel], data[at + 28 + channel:at + 28 + channel + size]
+            if name == b"VES_OPERATOR":
+                order = message("operator_t").decode(body)
+                out.append((order.header.source, order.header.sequence, order.request))
+            at += 28 + channel + size
+        return out
 
 
 def browser(profile):
