@@ -2,6 +2,16 @@
 #include "ves/robot/newton_euler.hpp"
 
 namespace ves {
+namespace {
+
+void setInertialWrench(const RigidBody& body, const Vec3& w, const Vec3& alpha, const Vec3& a,
+                       Vec3& f, Vec3& n) noexcept {
+  const Vec3& c = body.p_BoBcm_B;
+  f = body.mass * (a + alpha.cross(c) + w.cross(w.cross(c)));
+  n = body.I_Bcm_B * alpha + w.cross(body.I_Bcm_B * w) + c.cross(f);
+}
+
+}  // namespace
 
 ProperMotion properMotion(const BodyMotion& P, const Transform& X_PB, const Vec3& g_I) noexcept {
   const Mat3 R_BI = (P.X.R * X_PB.R).transpose();
@@ -11,69 +21,68 @@ ProperMotion properMotion(const BodyMotion& P, const Transform& X_PB, const Vec3
 }
 
 Wrench inertialWrench(const RigidBody& body, const ProperMotion& B) noexcept {
-  const Vec3& c = body.p_BoBcm_B;
-  const Vec3 F = body.mass * (B.a + B.alpha.cross(c) + B.w.cross(B.w.cross(c)));
-  const Vec3 N = body.I_Bcm_B * B.alpha + B.w.cross(body.I_Bcm_B * B.w);
-  return {F, N + c.cross(F)};
+  Wrench F;
+  setInertialWrench(body, B.w, B.alpha, B.a, F.f, F.n);
+  return F;
 }
 
+// Every result is written where it stays, one quantity a loop: a copy of a struct just written in
+// parts would wait for the stores, which took a third of the time.
 InverseDynamics newtonEuler(const RobotModel& robot, const JointState& q,
                             const ProperMotion& L0) noexcept {
   // Vectors and matrices of Eigen begin without values: only the links that there are cost time.
   std::array<Mat3, kMaxLinks> R;               // link in its parent
   std::array<Vec3, kMaxLinks> p, w, alpha, a;  // pose in its parent, and proper motion
   std::array<Vec3, kMaxLinks> f, n;            // wrench on the link, about its origin, its axes
+  const auto links = static_cast<std::size_t>(robot.size);
 
-  // Outward: motion of each link, and the wrench it takes.
-  for (int i = 0; i < robot.size; ++i) {
-    const auto k = static_cast<std::size_t>(i);
+  for (std::size_t k = 0; k < links; ++k) {
     const Link& link = robot.links[k];
-    const Transform X = linkPose(link, link.at(q.q(link.joint)));
-    R[k] = X.R;
-    p[k] = X.p;
+    setLinkPose(link, link.at(q.q(link.joint)), R[k], p[k]);
+  }
+
+  // Outward: motion of each link.
+  for (std::size_t k = 0; k < links; ++k) {
+    const Link& link = robot.links[k];
     const auto c = static_cast<std::size_t>(link.parent);
     const bool on_base = link.parent < 0;
     const Vec3 &w_c = on_base ? L0.w : w[c], &alpha_c = on_base ? L0.alpha : alpha[c],
                &a_c = on_base ? L0.a : a[c];
-    const Mat3 R_T = X.R.transpose();
-    ProperMotion m;
-    m.w = R_T * w_c;
-    m.alpha = R_T * alpha_c;
-    m.a = R_T * (a_c + alpha_c.cross(X.p) + w_c.cross(w_c.cross(X.p)));
+    const Mat3 R_T = R[k].transpose();
+    w[k] = R_T * w_c;
+    alpha[k] = R_T * alpha_c;
+    a[k] = R_T * (a_c + alpha_c.cross(p[k]) + w_c.cross(w_c.cross(p[k])));
     const double q_dot = link.ratio * q.q_dot(link.joint),
                  q_ddot = link.ratio * q.q_ddot(link.joint);
     switch (link.type) {
       case JointType::kRevolute:
-        m.alpha += m.w.cross(q_dot * link.axis) + q_ddot * link.axis;
-        m.w += q_dot * link.axis;
+        alpha[k] += w[k].cross(q_dot * link.axis) + q_ddot * link.axis;
+        w[k] += q_dot * link.axis;
         break;
       case JointType::kPrismatic:
-        m.a += 2.0 * m.w.cross(q_dot * link.axis) + q_ddot * link.axis;
+        a[k] += 2.0 * w[k].cross(q_dot * link.axis) + q_ddot * link.axis;
         break;
     }
-    const Wrench takes = inertialWrench(link.body, m);
-    f[k] = takes.f;
-    n[k] = takes.n;
-    w[k] = m.w;
-    alpha[k] = m.alpha;
-    a[k] = m.a;
   }
+
+  // The wrench each link takes.
+  for (std::size_t k = 0; k < links; ++k)
+    setInertialWrench(robot.links[k].body, w[k], alpha[k], a[k], f[k], n[k]);
 
   // Inward: what each link asks of its parent.
   InverseDynamics out;
-  out.F_L0o_L0 = inertialWrench(robot.base, L0);
-  for (int i = robot.size - 1; i >= 0; --i) {
-    const auto k = static_cast<std::size_t>(i);
+  Wrench& on_link_0 = out.F_L0o_L0;
+  setInertialWrench(robot.base, L0.w, L0.alpha, L0.a, on_link_0.f, on_link_0.n);
+  for (std::size_t k = links; k-- > 0;) {
     const Link& link = robot.links[k];
     out.tau(link.joint) +=
         link.ratio * link.axis.dot(link.type == JointType::kRevolute ? n[k] : f[k]);
-    const Wrench asked = transfer({R[k], p[k]}, {f[k], n[k]});
-    if (link.parent < 0) {
-      out.F_L0o_L0 = out.F_L0o_L0 + asked;
-    } else {
-      f[static_cast<std::size_t>(link.parent)] += asked.f;
-      n[static_cast<std::size_t>(link.parent)] += asked.n;
-    }
+    const auto c = static_cast<std::size_t>(link.parent);
+    const bool on_base = link.parent < 0;
+    Vec3 &f_c = on_base ? on_link_0.f : f[c], &n_c = on_base ? on_link_0.n : n[c];
+    const Vec3 f_asked = R[k] * f[k];
+    f_c += f_asked;
+    n_c += R[k] * n[k] + p[k].cross(f_asked);
   }
   return out;
 }

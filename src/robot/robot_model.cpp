@@ -68,22 +68,28 @@ RobotModel withLoad(RobotModel robot, int link, const RigidBody& load) noexcept 
   return robot;
 }
 
-Transform linkPose(const Link& link, double q) noexcept {
-  switch (link.type) {
-    case JointType::kRevolute:
-      if (link.axis == Vec3::UnitZ()) {  // as in DH parameters, and most of the time
-        const double s = std::sin(q), c = std::cos(q);
-        const Mat3& R = link.X_parent.R;
-        Transform X = link.X_parent;
-        X.R.col(0) = c * R.col(0) + s * R.col(1);
-        X.R.col(1) = c * R.col(1) - s * R.col(0);
-        return X;
-      }
-      return {link.X_parent.R * Eigen::AngleAxisd(q, link.axis).toRotationMatrix(),
-              link.X_parent.p};
-    case JointType::kPrismatic: return {link.X_parent.R, link.X_parent * Vec3(q * link.axis)};
+void setLinkPose(const Link& link, double q, Mat3& R, Vec3& p) noexcept {
+  const Transform& X = link.X_parent;
+  if (link.type == JointType::kPrismatic) {
+    R = X.R;
+    p = X * Vec3(q * link.axis);
+    return;
   }
-  return {};
+  p = X.p;
+  if (link.axis != Vec3::UnitZ()) {
+    R = X.R * Eigen::AngleAxisd(q, link.axis).toRotationMatrix();
+    return;
+  }
+  const double s = std::sin(q), c = std::cos(q);  // as in DH parameters, and most of the time
+  R.col(0) = c * X.R.col(0) + s * X.R.col(1);
+  R.col(1) = c * X.R.col(1) - s * X.R.col(0);
+  R.col(2) = X.R.col(2);
+}
+
+Transform linkPose(const Link& link, double q) noexcept {
+  Transform X;
+  setLinkPose(link, q, X.R, X.p);
+  return X;
 }
 
 }  // namespace ves

@@ -118,5 +118,7 @@ RobotModel withLoad(RobotModel robot, int link, const RigidBody& load) noexcept;
 
 /// Pose of a link's frame in its parent's, its joint at q.
 Transform linkPose(const Link& link, double q) noexcept;
+/// The same, written to R [3x3] and p [m].
+void setLinkPose(const Link& link, double q, Mat3& R, Vec3& p) noexcept;
 
 }  // namespace ves
