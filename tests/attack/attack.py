@@ -34,6 +34,9 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 CONFIG = ROOT / "config"
 GROUP, PORT = "239.255.76.67", 7667
 SHORT = "program=[{trajectory: {duration_s: 1, z: {sine: {amplitude_m: 0.02, frequency_hz: 1}}}}]"
+# What a machine busy with other things does to a run in real time is no finding.
+ON_TIME = ["--set", "safety.stall_ticks=1000", "--set", "safety.overruns_per_second=1000"]
+FRESH = ["--set", "safety.stale_ticks=1000"]
 VERDICTS = ("refused", "survived", "lost", "crashed", "slow")
 
 
@@ -226,8 +229,7 @@ def attack_signals(rng, folder):
     def send(process):
         time.sleep(after)
         process.send_signal(number)
-    run = Run(["run", "z_sine", "--no-plots", "--set", "safety.stall_ticks=500", "--set",
-               "safety.overruns_per_second=500", "--set",
+    run = Run(["run", "z_sine", "--no-plots", *ON_TIME, *FRESH, "--set",
                "program=[{trajectory: {duration_s: 2, z: {sine: {amplitude_m: 0.1, frequency_hz: 0.5}}}}]",
                "--out", "out"], folder, sent=send)
     return judge(run, lambda: results(folder / "out"), bound=False), run
@@ -249,8 +251,7 @@ def attack_kills(rng, folder):
         seen = log.stat().st_size if log.exists() else 0
         time.sleep(1.0)
         os.kill(of.get(victim, process.pid), signal.SIGKILL)
-    run = Run(["run", "z_sine", "--no-plots", "--set", "safety.stall_ticks=500", "--set",
-               "safety.overruns_per_second=500", "--set",
+    run = Run(["run", "z_sine", "--no-plots", *ON_TIME, "--set",
                "program=[{trajectory: {duration_s: 9, z: {sine: {amplitude_m: 0.1, frequency_hz: 0.5}}}}]",
                "--out", "out"], folder, sent=kill)
     log = folder / "out" / "run.lcmlog"
@@ -331,8 +332,7 @@ def attack_datagrams(rng, folder, count):
                 sent += 1
                 if sent % 10 == 0:  # a thousand a second
                     time.sleep(max(0.0, begun + sent / 1000 - time.monotonic()))
-    run = Run(["run", "z_sine", "--no-plots", "--set", "safety.stall_ticks=500", "--set",
-               "safety.overruns_per_second=500", "--set",
+    run = Run(["run", "z_sine", "--no-plots", *ON_TIME, *FRESH, "--set",
                f"program=[{{trajectory: {{duration_s: {count / 1000 + 1:.0f}, z: {{sine: {{amplitude_m: "
                "0.05, frequency_hz: 0.5}}}}]", "--out", "out"], folder, sent=flood,
               patience=90.0 + count / 500)
