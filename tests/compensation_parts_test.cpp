@@ -6,11 +6,13 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
+#include <functional>
 #include <random>
 
 #include "support/leg.hpp"
 #include "support/poses.hpp"
 #include "support/rig.hpp"
+#include "ves/control/port_work.hpp"
 #include "ves/math/dense.hpp"
 #include "ves/plant/nominal_servo.hpp"
 
@@ -368,9 +370,13 @@ TEST(ServoObserver, ReadingBoundsItWhateverTheModel) {
 }
 
 /// A machine and its servo model side by side over two seconds of a wavy reference; what the
-/// sensor's filter makes of the machine's own acceleration, by small steps.
+/// sensor's filter makes of the machine's own acceleration, by small steps. Looks at the model
+/// after each tick.
 struct SideBySide {
-  explicit SideBySide(const ServoModel& servo, std::int64_t late = 0)
+  using Look = std::function<void(int tick, const ServoObserver&)>;
+  explicit SideBySide(
+      const ServoModel& servo, std::int64_t late = 0,
+      const Look& look = [](int, const ServoObserver&) {})
       : e(experiment("z_sine", kCompensated)), leg(e.plant, 1.5), observer(servo, 0.01) {
     observer.reset(Vec6::Constant(1.5), 0);
     Butterworth2<1> filter(e.plant.sensor.cutoff);
@@ -397,7 +403,7 @@ struct SideBySide {
       observer.correct(legLengths(e.controller.legs, read), (k + 1) * kTick);
       modelled.push_back(observer.filteredAcceleration((k + 1) * kTick)(0));
       earlier.push_back(observer.filteredAcceleration((k + 1) * kTick - 3'700'000)(0));
-      work.push_back(observer.workLength((k + 1) * kTick)(0));
+      look(k, observer);
     }
   }
   /// The machine's at `time` [ns], or its mean over `window` before.
@@ -425,7 +431,7 @@ struct SideBySide {
   Leg leg;
   ServoObserver observer;
   std::int32_t reference = legCounts(e.controller.legs, Vec6::Constant(1.5))[0];
-  std::vector<double> felt, length, modelled, earlier, work;
+  std::vector<double> felt, length, modelled, earlier;
 };
 
 TEST(ServoObserver, FeelsWhatTheSensorFeelsAtOnceAndOnAverage) {
@@ -456,45 +462,120 @@ TEST(ServoObserver, ASensorThatIsLaterShowsWhatWas) {
     }
 }
 
-// A force that swings as the machine's leg does pushes on it: its work by small steps, and from
-// what the sensor's filter lets through, a mean a tick, along the model's work length.
-TEST(ServoObserver, AFilteredForceDoesItsWorkAlongTheWorkLength) {
-  ServoModel servo = experiment("z_sine", kCompensated).controller.servo;
-  for (const double delay : {0.0, 4e-3}) {
-    servo.sensor_delay = delay;
-    const SideBySide run(servo);
-    const double dt = SideBySide::kStep * 1e-9;
-    const auto late = static_cast<std::size_t>(std::lround(delay / dt));
-    const std::size_t steps = kTick / SideBySide::kStep;
-    for (const double phase : {0.0, 1.0, 2.0, 3.0}) {
-      const auto force = [&](std::size_t i) {  // from rest to rest
-        const double t = dt * static_cast<double>(i), s = t / 1.98;
-        return s < 1.0 ? std::pow(std::sin(M_PI * s), 2) * std::cos(3.0 * t) *
-                             std::sin(25.0 * t + phase)
-                       : 0.0;
-      };
-      Butterworth2<1> filter(servo.sensor_cutoff);
-      const auto step = filter.prepare(dt);
-      std::vector<double> shown(late, 0.0);
-      double due = 0.0, all = 0.0;
-      for (std::size_t i = 1; i < run.length.size(); ++i) {
-        const double work = force(i) * (run.length[i] - run.length[i - 1]);
-        due += work;
-        all += std::abs(work);
-        filter.advance(step, Butterworth2<1>::Channels(force(i)));
-        shown.push_back(filter.output()(0));
+// A force that swings pushes the platform up and down while all legs move alike: its work by small
+// steps, and from what the sensor's filter lets through, a mean a tick or a reading.
+TEST(PortWork, IsThatOfTheForceBeforeTheSensorsFilter) {
+  ControllerConfig config = experiment("z_sine", kCompensated).controller;
+  const Geometry& g = config.geometry;
+  const double foot =
+      (legLengths(g, g.fromHome({})).cwiseAbs2().array() - g.home_height * g.home_height)
+          .mean();  // [m^2] of a leg's way across
+  const auto height = [&](double L) { return std::sqrt(L * L - foot); };
+  const Transform X_IP{Mat3::Identity(), {0.0, 0.0, height(1.5)}};
+  const double dt = SideBySide::kStep * 1e-9;
+  constexpr std::size_t kSteps = kTick / SideBySide::kStep, kAll = 200 * kSteps;
+  for (const bool mean : {false, true})
+    for (const double delay : {0.0, 4e-3})
+      for (const double phase : {0.0, 1.0, 2.0, 3.0}) {
+        config.servo.sensor_window = mean ? kTick * 1e-9 : 0.0;
+        config.servo.sensor_delay = delay;
+        const auto force = [&](std::size_t i) {  // from rest to rest
+          const double t = dt * static_cast<double>(i), s = t / 1.9;
+          return s < 1.0 ? std::pow(std::sin(M_PI * s), 2) * std::cos(3.0 * t) *
+                               std::sin(25.0 * t + phase)
+                         : 0.0;
+        };
+        Butterworth2<1> filter(config.servo.sensor_cutoff);
+        const auto step = filter.prepare(dt);
+        std::vector<double> shown(static_cast<std::size_t>(std::lround(delay / dt)), 0.0);
+        for (std::size_t i = 1; i <= kAll; ++i) {
+          filter.advance(step, Butterworth2<1>::Channels(force(i)));
+          shown.push_back(filter.output()(0));
+        }
+        PortWork port(config);
+        double newest = 0.0, settled = 0.0, unfiltered = 0.0, length_before = 1.5;
+        const SideBySide run(config.servo, 0, [&](int k, const ServoObserver& servo) {
+          const auto end = static_cast<std::size_t>(k + 1) * kSteps;
+          double sum = 0.0;
+          for (std::size_t i = end - kSteps; i < end; ++i) sum += shown[i];
+          Wrench F;
+          F.f.z() = mean ? sum / kSteps : shown[end - 1];
+          const PortWork::Work work = port.take(F, (k + 1) * kTick, X_IP, servo);
+          newest += work.newest;
+          settled += work.settled;
+          const double length = servo.length()(0);
+          unfiltered += F.f.z() * (height(length) - height(length_before));
+          length_before = length;
+        });
+        double due = 0.0, all = 0.0;
+        for (std::size_t i = 1; i < run.length.size(); ++i) {
+          const double work = force(i) * (height(run.length[i]) - height(run.length[i - 1]));
+          due += work;
+          all += std::abs(work);
+        }
+        EXPECT_NEAR(settled, due, 0.01 * all) << mean << " " << delay << " " << phase;
+        EXPECT_NEAR(newest, due, 0.015 * all) << mean << " " << delay << " " << phase;
+        EXPECT_GT(std::abs(unfiltered - due), 0.05 * all);
       }
-      double found = 0.0, along_lengths = 0.0;
-      for (std::size_t k = 1; k < run.work.size(); ++k) {
-        double mean = 0.0;
-        for (std::size_t i = k * steps; i < (k + 1) * steps; ++i)
-          mean += shown[i] / static_cast<double>(steps);
-        found += mean * (run.work[k] - run.work[k - 1]);
-        along_lengths += mean * (run.length[(k + 1) * steps - 1] - run.length[k * steps - 1]);
-      }
-      EXPECT_NEAR(found, due, 0.015 * all) << delay << " " << phase;
-      EXPECT_GT(std::abs(along_lengths - due), 0.1 * all);
+}
+
+// As exact as its polynomials, whatever the times of its readings: a force that is a cubic of time,
+// or a mean of one that is a parabola, on a platform that sinks at full speed.
+TEST(PortWork, IsExactForPolynomialsOfTime) {
+  ControllerConfig config = experiment("z_sine", kCompensated).controller;
+  const double w = config.servo.sensor_cutoff;
+  const Geometry& g = config.geometry;
+  const auto seconds = [](std::int64_t ns) { return static_cast<double>(ns) * 1e-9; };
+  for (const bool mean : {false, true}) {
+    const std::int64_t window = mean ? kTick : 0;
+    config.servo.sensor_window = seconds(window);
+    ServoObserver servo(config.servo, 0.01);
+    servo.reset(Vec6::Constant(1.6), 0);
+    servo.send(Vec6::Constant(1.3), 0, 0);
+    const double c_2 = -2e5, c_3 = mean ? 0.0 : 3e7;  // about 115 ms
+    const auto S = [&](double t) {                    // as read
+      const double s = t - 0.115;
+      return 5.0 + c_2 * (s * s + seconds(window) * seconds(window) / 12.0) + c_3 * s * s * s;
+    };
+    const auto F = [&](double t) {
+      const double s = t - 0.115;
+      return 5.0 + c_2 * s * s + c_3 * s * s * s +
+             M_SQRT2 / w * (2.0 * c_2 * s + 3.0 * c_3 * s * s) +
+             (2.0 * c_2 + 6.0 * c_3 * s) / (w * w);
+    };
+    PortWork port(config);
+    const std::int64_t middles[] = {100'000'000, 109'000'000, 121'000'000, 130'500'000};
+    std::array<double, 4> z{};
+    PortWork::Work work;
+    for (std::size_t i = 0; i < 4; ++i) {
+      servo.advance(middles[i]);
+      const Transform X_IP = forwardPose(g, servo.length(), g.fromHome({})).X_IP;
+      z[i] = X_IP.p.z();
+      EXPECT_EQ(work.settled, 0.0);
+      Wrench reading;
+      reading.f.z() = S(seconds(middles[i]));
+      const std::int64_t read = middles[i] + window / 2;
+      work = port.take(reading, read, X_IP, servo);
+      EXPECT_EQ(work.newest == 0.0, i < 2);
+      const PortWork::Work again = port.take(reading, read, X_IP, servo);  // it is not new
+      EXPECT_EQ(again.newest, 0.0);
+      EXPECT_EQ(again.settled, 0.0);
     }
+    ASSERT_LT(z[2] - z[1], -1e-3);
+    // Simpson's rule: F is a cubic.
+    const double due = (z[2] - z[1]) / 6.0 * (F(0.109) + 4.0 * F(0.115) + F(0.121));
+    const double unfiltered = (z[2] - z[1]) / 6.0 * (S(0.109) + 4.0 * S(0.115) + S(0.121));
+    EXPECT_NEAR(work.settled, due, 0.02 * std::abs(due))
+        << mean;  // and the speed is not quite constant
+    EXPECT_GT(std::abs(unfiltered - due), 0.5 * std::abs(due));
+    // Of what the servo model has not reached yet it knows no motion.
+    EXPECT_TRUE(servo.moments(middles[3] + 1'000'000, middles[3] + 9'000'000).isZero(0.0));
+    // After a gap the readings before it say nothing.
+    const std::int64_t later = middles[3] + 40'000'000;
+    servo.advance(later);
+    work = port.take({}, later, g.fromHome({}), servo);
+    EXPECT_EQ(work.newest, 0.0);
+    EXPECT_EQ(work.settled, 0.0);
   }
 }
 

@@ -170,5 +170,23 @@ TEST(BodyMotionOfCoordinates, MatchesFiniteDifferences) {  // (2.27), (2.33)
   }
 }
 
+TEST(PlatformMotions, AreThoseWhoseLegsTheyAre) {
+  const Geometry g = geometry();
+  for (const Pose& x : test::poses()) {
+    const Transform X = g.fromHome(x);
+    Motions twists, legs;
+    for (int i = 0; i < 4; ++i) {
+      twists.col(i) = Vec6::Unit(i) - 0.3 * Vec6::Unit(5 - i) + 0.1 * Vec6::Ones();
+      BodyMotion P;
+      P.X = X;
+      P.v = twists.col(i).head<3>();
+      P.w = twists.col(i).tail<3>();
+      legs.col(i) = legMotion(g, P).L_dot;
+    }
+    ASSERT_TRUE(platformMotions(g, X, legs));
+    ASSERT_LT((legs - twists).norm(), 1e-11) << x.stacked().transpose();
+  }
+}
+
 }  // namespace
 }  // namespace ves

@@ -11,6 +11,7 @@ AdmittanceControl::AdmittanceControl(const ControllerConfig& config)
     : model_(config.admittance, config.periodSeconds()),
       inertia_(config.compensation.inertia),
       wrench_delay_(wrenchDelay(config.servo, config.periodSeconds())),
+      port_(config),
       energy_(config),
       period_(config.periodSeconds()),
       joint_moves_(config.stillness.joint),
@@ -35,8 +36,8 @@ const PathPoint<6>& AdmittanceControl::step(const AdmittanceInput& in, const Vec
     else
       model_.step(in.F_Po_I, energy_.damping());
     slowInsideEnvelope(last, in.L, checks);
-    energy_.take(in.F_Po_I, in.work_place, model_.taken(in.F_Po_I), model_.damped(),
-                 model_.kineticEnergy());
+    energy_.take(model_.taken(in.F_Po_I), port_.take(in.F_Po_I, in.wrench.time, in.X_IP, in.servo),
+                 model_.damped(), model_.kineticEnergy());
     const bool held = scale_ < 1.0 && model_.kineticEnergy() > growth_floor_;
     oscillation_.take(model_.energy(), held, in.q, joint_moves_, period_, growth_floor_);
   }

@@ -49,12 +49,6 @@ const Measured& LegEstimator::update(const SampleStream& samples, const Elapsed&
   return measured_;
 }
 
-Vec6 LegEstimator::workPlace(std::int64_t time) noexcept {
-  const ForwardSolution forward =
-      forwardPose(geometry_, servo_.workLength(time), measured_.X_IP, near_);
-  return geometry_.toHome(forward.ok() ? forward.X_IP : measured_.X_IP).stacked();
-}
-
 void LegEstimator::adapt(const Sample& sample) noexcept {
   adaptation_.arrived(sample.command_tick, sample.command_time);
   adaptation_.learn(measured_.L, sample.legs_time);

@@ -71,7 +71,6 @@ ServoObserver::Instant ServoObserver::at(std::int64_t time) const noexcept {
     out.filtered_a_rate = (1.0 - s) * earlier.filtered_a_rate + s * later->filtered_a_rate;
     // Between two updates v goes to where the last one sends it.
     const Eigen::Array<double, kLegs, 1> tau = model().tau.array(), decay = (-h * s / tau).exp();
-    out.a = (earlier.a.array() * decay).matrix();
     out.v = earlier.v + (tau * (1.0 - decay) * earlier.a.array()).matrix();
     return out;
   }
@@ -86,10 +85,25 @@ Vec6 ServoObserver::filteredAcceleration(std::int64_t time) const noexcept {
   return (end.filtered_v - begin.filtered_v - delay * (end.filtered_a - begin.filtered_a)) / window;
 }
 
-Vec6 ServoObserver::workLength(std::int64_t time) const noexcept {
-  const double w = model().sensor_cutoff;
-  const Instant then = at(time - std::llround(model().sensor_delay * 1e9));
-  return then.L - (M_SQRT2 / w) * then.v + then.a / (w * w);
+Motions ServoObserver::moments(std::int64_t from, std::int64_t to) const noexcept {
+  const Instant first = at(from), last = at(to);
+  Motions sum = Motions::Zero();
+  const auto add = [&](const Instant& earlier, const Instant& later) {
+    const double t = 0.5 * kSecondPerNanosecond *
+                     static_cast<double>((earlier.time - from) + (later.time - from));
+    Vec6 term = later.L - earlier.L;
+    for (Eigen::Index n = 0; n < sum.cols(); ++n, term *= t) sum.col(n) += term;
+  };
+  const Instant* later = &last;
+  for (std::size_t i = 1; i <= std::min(remembered_, kInstants); ++i) {
+    const Instant& earlier = past_[(remembered_ - i) % kInstants];
+    if (earlier.time <= first.time) break;
+    if (earlier.time >= last.time) continue;
+    add(earlier, *later);
+    later = &earlier;
+  }
+  add(first, *later);
+  return sum;
 }
 
 void ServoObserver::correct(const Vec6& L, std::int64_t time) noexcept {

@@ -94,7 +94,7 @@ PathPoint<6> TestPlatform::nextMotion(const Wrench& dynamic) noexcept {
   if (supervisor_.runs(motion_, SegmentKind::kAdmittance))
     return motion_.admittanceModel(
         {dynamic, robot_.M_1(), share_.value(), samples_.wrench(), sample.q, commander_.legs().L,
-         legs_.workPlace(sample.wrench_time)},
+         legs_.measured().X_IP, legs_.servo()},
         safety_.path());
   if (supervisor_.moves()) return motion_.trajectoryGeneration();
   // Until the legs follow, they are where they are measured.

@@ -137,6 +137,14 @@ ForwardSolution forwardPose(const Geometry& geometry, const Vec6& L, const Trans
   return solve(geometry, L, guess, near, 0.1);
 }
 
+bool platformMotions(const Geometry& geometry, const Transform& X_IP, Motions& motions) noexcept {
+  JacobianFactors here;
+  if (!factorise(legs(geometry, X_IP), here)) return false;
+  const Motions rhs = legLengths(geometry, X_IP).asDiagonal() * motions;
+  motions = here.lu.solve(rhs);
+  return true;
+}
+
 double jointRadius(const Geometry& geometry) noexcept {
   Vec3 middle = Vec3::Zero();
   for (const Vec3& p : geometry.p_PPi_P) middle += p / kLegs;

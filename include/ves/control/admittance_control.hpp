@@ -19,7 +19,8 @@ struct AdmittanceInput {
   const WrenchTiming& wrench;  // when F_Po_I was read
   const JointVector& q;        // of the robot
   const Vec6& L;               // [m] lengths last commanded
-  const Vec6& work_place;      // [m, rad] along which F_Po_I does its work
+  const Transform& X_IP;       // as measured
+  const ServoObserver& servo;  // how the platform has moved
 };
 
 class AdmittanceControl {
@@ -52,6 +53,7 @@ class AdmittanceControl {
   double wrench_delay_;  // [s]
   bool begins_ = true;   // the first step: what was before it does not count
   Oscillation oscillation_;
+  PortWork port_;
   EnergyAccount energy_;
   double period_;        // [s]
   double joint_moves_;   // [rad | m] what counts as a motion of the robot

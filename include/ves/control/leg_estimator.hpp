@@ -42,9 +42,6 @@ class LegEstimator {
   /// Measured lengths, and rates and accelerations by the servo model as the sample's wrench shows
   /// them; of a controller that compensates inertia.
   const LegMotion& feltMotion() const noexcept { return felt_; }
-  /// [m, rad] Coordinates about home along which a wrench that was read at `time` [ns] does its
-  /// work: of ServoObserver::workLength().
-  Vec6 workPlace(std::int64_t time) noexcept;
 
  private:
   void adapt(const Sample& sample) noexcept;
@@ -60,7 +57,6 @@ class LegEstimator {
   LegSpeed speed_;
   Measured measured_;
   LegMotion felt_;
-  JacobianFactors near_;
 };
 
 }  // namespace ves

@@ -47,10 +47,8 @@ class ServoObserver {
   /// over the sensor's window, sensor_delay before. The mean of the filtered acceleration is the
   /// change of the filtered speed.
   Vec6 filteredAcceleration(std::int64_t time) const noexcept;
-  /// [m] along which a wrench that was read at `time` does its work. What has passed the sensor's
-  /// filter as F was F + sqrt(2)/w F' + F''/w^2; by parts, its work along L is that of F along
-  /// L - sqrt(2)/w L' + L''/w^2.
-  Vec6 workLength(std::int64_t time) const noexcept;
+  /// The legs' motion from one time to another, and its moments: int t^n dL, t [s] after `from`.
+  Motions moments(std::int64_t from, std::int64_t to) const noexcept;
 
  private:
   using Channels = ModelledServos::Channels;

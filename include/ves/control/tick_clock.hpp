@@ -42,8 +42,9 @@ class TickClock {
 
 /// When a tick's wrench was read.
 struct WrenchTiming {
-  double since = 0.0;  // [s] after the one before; 0: there is no new one
-  double age = 0.0;    // [s] before the tick
+  double since = 0.0;     // [s] after the one before; 0: there is no new one
+  double age = 0.0;       // [s] before the tick
+  std::int64_t time = 0;  // [ns]
 };
 
 /// The newest sample and its age.
@@ -72,7 +73,7 @@ class SampleStream {
              kSecondPerNanosecond;
     };
     wrench_ = {!newer ? 0.0 : seconds(first ? period_ : sample_.wrench_time - before.wrench_time),
-               seconds(now - sample_.wrench_time)};
+               seconds(now - sample_.wrench_time), sample_.wrench_time};
   }
   /// The count of fresh ticks begins anew.
   void restart() noexcept { fresh_ticks_ = 0; }

@@ -87,6 +87,12 @@ struct JacobianFactors {
 ForwardSolution forwardPose(const Geometry& geometry, const Vec6& L, const Transform& guess,
                             JacobianFactors& near) noexcept;
 
+/// Four columns of small motions: of the legs [m], or of the platform as twists [m | rad]_Po_I.
+using Motions = Eigen::Matrix<double, 6, 4>;
+/// The platform's motions that the legs' are, at X_IP. False, and as it was, when the Jacobian is
+/// singular.
+bool platformMotions(const Geometry& geometry, const Transform& X_IP, Motions& motions) noexcept;
+
 /// [m] root mean square distance of the platform's joints from their middle: how large it is.
 double jointRadius(const Geometry& geometry) noexcept;
 
