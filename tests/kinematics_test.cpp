@@ -188,5 +188,14 @@ TEST(PlatformMotions, AreThoseWhoseLegsTheyAre) {
   }
 }
 
+TEST(PlatformMotions, OfASingularPoseStayAsTheyWere) {
+  Geometry g = geometry();
+  g.p_PPi_P.fill(g.p_PPi_P[0]);  // all legs end in one joint
+  const Motions legs = Motions::Constant(0.01);
+  Motions motions = legs;
+  EXPECT_FALSE(platformMotions(g, g.fromHome({}), motions));
+  EXPECT_EQ(motions, legs);
+}
+
 }  // namespace
 }  // namespace ves

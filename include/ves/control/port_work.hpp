@@ -8,8 +8,8 @@
 
 namespace ves {
 
-/// Work is the wrench along the motion, and each is known otherwise: the wrench by readings behind
-/// the sensor's filter, the motion by the servo model (ServoObserver), within a tick too.
+/// The wrench is known by one reading a tick, behind the sensor's filter; the motion by the servo
+/// model (ServoObserver), within a tick too.
 ///
 /// A polynomial through the readings says what the filter let through, S, and what went in was
 /// F = S + sqrt(2)/w S' + S''/w^2.

@@ -44,7 +44,7 @@ class TickClock {
 struct WrenchTiming {
   double since = 0.0;     // [s] after the one before; 0: there is no new one
   double age = 0.0;       // [s] before the tick
-  std::int64_t time = 0;  // [ns]
+  std::int64_t time = 0;  // [ns] of the machine's clock
 };
 
 /// The newest sample and its age.
