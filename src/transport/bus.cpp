@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <lcm/lcm-cpp.hpp>
 
 #include "ves/base/errors.hpp"
 #include "ves/realtime/realtime.hpp"
@@ -50,6 +51,53 @@ bool hasRoute() {
 const std::string& reachable(const BusAddress& address) {
   if (!hasRoute()) refuse(address.lcm);
   return address.lcm;
+}
+
+/// UDP multicast: liblcm sends, the Receiver reads.
+class Multicast : public Wire {
+ public:
+  explicit Multicast(const BusAddress& address) : address_(address), lcm_(reachable(address_)) {}
+
+  bool good() { return lcm_.good(); }
+  /// One message to ourselves, within two seconds.
+  bool echoes();
+
+  bool send(const std::string& channel, const void* data, std::size_t size) noexcept override {
+    return lcm_.publish(channel, data, static_cast<unsigned>(size)) == 0;
+  }
+  void hear(const std::string& channel) override {
+    if (!receiver_) receiver_.emplace(address_.group, address_.port);
+    receiver_->hear(channel);
+  }
+  bool read(std::optional<Received>& message) noexcept override {
+    return receiver_ && receiver_->read(message);
+  }
+  bool readable(std::int64_t until) const noexcept override {
+    return receiver_ && receiver_->readable(until);
+  }
+  int descriptor() const noexcept override { return receiver_ ? receiver_->descriptor() : -1; }
+  std::int64_t now() const noexcept override { return monotonicNow(); }
+
+ private:
+  BusAddress address_;
+  lcm::LCM lcm_;
+  std::optional<Receiver> receiver_;  // who only speaks has none
+};
+
+bool Multicast::echoes() {
+  const std::string channel = "VES_ECHO";
+  Receiver receiver(address_.group, address_.port);
+  receiver.hear(channel);
+  std::optional<Received> heard;
+  for (int i = 0; i < 20; ++i) {
+    if (lcm_.publish(channel, "?", 1) != 0) return false;
+    const std::int64_t until = monotonicNow() + 100'000'000;
+    do {
+      while (receiver.read(heard))
+        if (heard) return true;
+    } while (receiver.readable(until));
+  }
+  return false;
 }
 
 }  // namespace
@@ -97,29 +145,17 @@ std::string openBusWarning(const std::string& url) {
       url);
 }
 
-Bus::Bus(const std::string& url)
-    : address_(url), lcm_(reachable(address_)), several_processors_(severalProcessors()) {
-  if (!address_.key_file.empty()) key_.emplace(address_.key_file);
-  if (!lcm_.good()) throw InputError(fmt::format("--url {}: not a bus that LCM can open", url));
-  if (!echoes()) refuse(url);
+Bus::Bus(const std::string& url) : several_processors_(severalProcessors()) {
+  const BusAddress address(url);
+  auto wire = std::make_unique<Multicast>(address);
+  if (!address.key_file.empty()) key_.emplace(address.key_file);
+  if (!wire->good()) throw InputError(fmt::format("--url {}: not a bus that LCM can open", url));
+  if (!wire->echoes()) refuse(url);
+  wire_ = std::move(wire);
 }
 
-/// One message to ourselves, within two seconds.
-bool Bus::echoes() {
-  const std::string channel = "VES_ECHO";
-  Receiver receiver(address_.group, address_.port);
-  receiver.hear(channel);
-  std::optional<Received> heard;
-  for (int i = 0; i < 20; ++i) {
-    if (lcm_.publish(channel, "?", 1) != 0) return false;
-    const std::int64_t until = monotonicNow() + 100'000'000;
-    do {
-      while (receiver.read(heard))
-        if (heard) return true;
-    } while (receiver.readable(until));
-  }
-  return false;
-}
+Bus::Bus(std::unique_ptr<Wire> wire) noexcept
+    : wire_(std::move(wire)), several_processors_(false) {}
 
 void Bus::publish(const std::string& channel, const experiment_t& message) {
   std::vector<std::uint8_t> bytes(static_cast<std::size_t>(message.getEncodedSize()));
@@ -129,7 +165,7 @@ void Bus::publish(const std::string& channel, const experiment_t& message) {
 
 void Bus::send(const std::string& channel, std::uint8_t* message, std::size_t size) noexcept {
   if (key_) key_->sign(channel, message, size);
-  if (lcm_.publish(channel, message, static_cast<unsigned>(size)) != 0) ++failed_;
+  if (!wire_->send(channel, message, size)) ++failed_;
 }
 
 /// Signed, and not heard before; anything on a bus without a key.
@@ -147,9 +183,8 @@ bool Bus::lets(const Received& message, const std::string& channel) noexcept {
 }
 
 void Bus::subscribe(const std::vector<std::string>& channels, const Handler& handler) {
-  if (!receiver_) receiver_.emplace(address_.group, address_.port);
   for (const std::string& channel : channels) {
-    receiver_->hear(channel);
+    wire_->hear(channel);
     subscriptions_.push_back({channel, handler});
   }
 }
@@ -170,25 +205,25 @@ bool Bus::handOut(const Received& message) noexcept {
 
 void Bus::drain() noexcept {
   std::optional<Received> message;
-  for (int i = 0; receiver_ && i < kAtOnce && receiver_->read(message); ++i)
+  for (int i = 0; i < kAtOnce && wire_->read(message); ++i)
     if (message) handOut(*message);
 }
 
 bool Bus::wait(int milliseconds) noexcept {
-  return waitUntil(monotonicNow() + milliseconds * kMillisecond, 0);
+  return waitUntil(now() + milliseconds * kMillisecond, 0);
 }
 
 bool Bus::waitAwake(int milliseconds) noexcept {
-  const std::int64_t now = monotonicNow();
+  const std::int64_t now = this->now();
   return waitUntil(now + milliseconds * kMillisecond, several_processors_ ? now + kAwake : 0);
 }
 
 bool Bus::waitUntil(std::int64_t until, std::int64_t awake) noexcept {
   std::optional<Received> message;
   do {
-    for (int i = 0; i < kAtOnce && receiver_->read(message); ++i)
+    for (int i = 0; i < kAtOnce && wire_->read(message); ++i)
       if (message && handOut(*message)) return true;
-  } while (monotonicNow() < awake || receiver_->readable(until));
+  } while (now() < awake || wire_->readable(until));
   return false;
 }
 
@@ -297,7 +332,7 @@ void ControllerLink::send(leg_command_t command) noexcept {
   engaged_ = command.engaged != 0;
   command.machine = plant_.source;
   const std::int64_t sequence = command.header.sequence;
-  sent_[static_cast<std::size_t>(sequence + 1) % sent_.size()] = {sequence, monotonicNow()};
+  sent_[static_cast<std::size_t>(sequence + 1) % sent_.size()] = {sequence, bus_.now()};
   bus_.publish(channel::kLegCommand, command);
 }
 

@@ -29,18 +29,37 @@ void put(std::vector<std::uint8_t>& to, std::uint64_t value, int bytes) {
   for (int i = bytes - 1; i >= 0; --i) to.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
 }
 
+class FileDisk : public Disk {
+ public:
+  explicit FileDisk(const std::string& path)
+      : file_(open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666)) {
+    if (file_ < 0)
+      throw InputError(fmt::format("{}: cannot be written: {}", path, strerror(errno)));
+  }
+  ~FileDisk() override { close(file_); }
+  FileDisk(const FileDisk&) = delete;
+  FileDisk& operator=(const FileDisk&) = delete;
+
+  std::int64_t write(const void* data, std::size_t size) noexcept override {
+    return ::write(file_, data, size);
+  }
+  void cutTo(std::int64_t size) noexcept override {
+    if (ftruncate(file_, size) == 0) lseek(file_, size, SEEK_SET);
+  }
+
+ private:
+  int file_;
+};
+
 }  // namespace
 
-LogWriter::LogWriter(const std::string& path)
-    : file_(open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666)) {
-  if (file_ < 0) throw InputError(fmt::format("{}: cannot be written: {}", path, strerror(errno)));
+LogWriter::LogWriter(const std::string& path) : LogWriter(std::make_unique<FileDisk>(path)) {}
+
+LogWriter::LogWriter(std::unique_ptr<Disk> disk) : disk_(std::move(disk)) {
   waiting_.reserve(kBuffer);
 }
 
-LogWriter::~LogWriter() {
-  flush();
-  close(file_);
-}
+LogWriter::~LogWriter() { flush(); }
 
 void LogWriter::write(const std::string& channel, const void* data, std::int64_t size,
                       std::int64_t time_ns) noexcept {
@@ -61,7 +80,7 @@ void LogWriter::write(const std::string& channel, const void* data, std::int64_t
 void LogWriter::flush() noexcept {
   std::size_t written = 0;
   while (written < waiting_.size()) {
-    const ssize_t n = ::write(file_, waiting_.data() + written, waiting_.size() - written);
+    const std::int64_t n = disk_->write(waiting_.data() + written, waiting_.size() - written);
     if (n < 0 && errno == EINTR) continue;
     if (n <= 0) break;
     written += static_cast<std::size_t>(n);
@@ -72,7 +91,7 @@ void LogWriter::flush() noexcept {
     error_ = errno;
     lost_ += waiting_events_;
     // No half event stays; what comes later may find room again.
-    if (ftruncate(file_, whole_) == 0) lseek(file_, whole_, SEEK_SET);
+    disk_->cutTo(whole_);
   }
   waiting_.clear();
   waiting_events_ = 0;

@@ -41,7 +41,7 @@ struct Program {
 
 /// When something happens: `after` the controller's program reached `segment`.
 struct Cue {
-  int segment = 0;         // [-]
+  int segment = 0;         // [-] -1: since the machine began
   std::int64_t after = 0;  // [ns]
 };
 

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // LCM, behind one small door. Handlers store and count; they never act, throw or log.
+//
+// What carries the messages is a Wire: LCM's multicast, or memory, where one process holds both
+// ends, the clock, and all that goes wrong between them.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <functional>
-#include <lcm/lcm-cpp.hpp>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -47,11 +50,27 @@ struct Refused {
   std::string text() const;
 };
 
+class Wire {
+ public:
+  virtual ~Wire() = default;
+  virtual bool send(const std::string& channel, const void* data, std::size_t size) noexcept = 0;
+  /// From now on this channel's messages are read too. Throws InputError.
+  virtual void hear(const std::string& channel) = 0;
+  /// Receiver::read, ::readable and ::descriptor; nothing, never and -1 before hear().
+  virtual bool read(std::optional<Received>& message) noexcept = 0;
+  virtual bool readable(std::int64_t until) const noexcept = 0;
+  virtual int descriptor() const noexcept = 0;
+  /// [ns] of this host's clock, as in Received::arrival.
+  virtual std::int64_t now() const noexcept = 0;
+};
+
 class Bus {
  public:
   /// Opens the bus and proves that a message comes back. Throws InputError with the remedy. With a
   /// key it signs what it sends, and hands on only what is signed and has not been before.
   explicit Bus(const std::string& url);
+  /// A bus without a key on a wire of one's own.
+  explicit Bus(std::unique_ptr<Wire> wire) noexcept;
 
   /// Encodes on the stack: no heap.
   template <typename Message>
@@ -74,7 +93,7 @@ class Bus {
   /// Hands out what has arrived: all, unless somebody floods the bus.
   void drain() noexcept;
   /// Readable when a message has arrived. After the first subscription, as wait().
-  int descriptor() const noexcept { return receiver_->descriptor(); }
+  int descriptor() const noexcept { return wire_->descriptor(); }
   /// Waits for one message; false when none came in time, or a signal did.
   bool wait(int milliseconds) noexcept;
   /// The same, for an answer that may come within microseconds: awake for the first 50, where there
@@ -83,6 +102,7 @@ class Bus {
 
   /// [ns] monotonic, when the message that a handler has in hand came to this host.
   std::int64_t arrival() const noexcept { return arrival_; }
+  std::int64_t now() const noexcept { return wire_->now(); }  // [ns] of the same clock
   bool keyed() const noexcept { return key_.has_value(); }
   const Refused& refused() const noexcept { return refused_; }
   std::int64_t failed() const noexcept { return failed_; }  // [-] messages not sent
@@ -93,15 +113,12 @@ class Bus {
     Handler handler;
   };
   void send(const std::string& channel, std::uint8_t* message, std::size_t size) noexcept;
-  bool echoes();
   bool waitUntil(std::int64_t until, std::int64_t awake) noexcept;
   bool handOut(const Received& message) noexcept;
   bool lets(const Received& message, const std::string& channel) noexcept;
 
-  BusAddress address_;
+  std::unique_ptr<Wire> wire_;
   std::optional<Key> key_;
-  lcm::LCM lcm_;                      // sends
-  std::optional<Receiver> receiver_;  // who only speaks has none
   std::vector<Subscription> subscriptions_;
   ReplayGuard guard_;
   Refused refused_;

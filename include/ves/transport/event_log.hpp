@@ -17,10 +17,21 @@
 
 namespace ves {
 
+/// Where a log's bytes go: a file, or memory that can be full.
+class Disk {
+ public:
+  virtual ~Disk() = default;
+  /// As POSIX write(): the bytes taken, which may be fewer; -1 and errno.
+  virtual std::int64_t write(const void* data, std::size_t size) noexcept = 0;
+  /// Nothing stays beyond `size` [B], and what is written next follows there.
+  virtual void cutTo(std::int64_t size) noexcept = 0;
+};
+
 class LogWriter {
  public:
   /// Throws InputError when the file cannot be written.
   explicit LogWriter(const std::string& path);
+  explicit LogWriter(std::unique_ptr<Disk> disk);
   ~LogWriter();
   LogWriter(const LogWriter&) = delete;
   LogWriter& operator=(const LogWriter&) = delete;
@@ -43,7 +54,7 @@ class LogWriter {
   std::string trouble() const;
 
  private:
-  int file_ = -1;
+  std::unique_ptr<Disk> disk_;
   std::vector<std::uint8_t> buffer_;   // one message
   std::vector<std::uint8_t> waiting_;  // whole events
   std::int64_t waiting_events_ = 0;    // [-]
