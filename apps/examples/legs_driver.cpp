@@ -39,19 +39,6 @@ class MockLegs {
   double at_[6];  // [count]
 };
 
-/// What they do while nobody commands: the last reference, or slowly home when the last command let
-/// them and its silence lasts.
-LegCounts whileSilent(const LegCommand& last, const LegCounts& home,
-                      const plant::Watchdog& watchdog, std::int64_t silence) {
-  if (!last.park || silence <= watchdog.park_after) return last.counts;
-  const double share = std::min(1.0, static_cast<double>(silence - watchdog.park_after) /
-                                         static_cast<double>(watchdog.park_time));
-  LegCounts out = last.counts;
-  for (std::size_t i = 0; i < 6; ++i)
-    out[i] += static_cast<std::int32_t>(std::lround(share * (home[i] - out[i])));
-  return out;
-}
-
 void drive(const Experiment& experiment, const std::string& url) {
   const Identity self = Identity::draw();
   Bus bus(url);
@@ -59,19 +46,20 @@ void drive(const Experiment& experiment, const std::string& url) {
   const ControllerConfig& c = experiment.controller;
   const LegCounts home = legCounts(c.legs, legLengths(c.geometry, c.geometry.fromHome(Pose())));
   MockLegs legs(home);
-  LegCommand last;
-  std::int64_t heard = 0, sequence = 0;
+  std::optional<plant::LegWatchdog> watchdog;  // once a command engages
+  std::int64_t sequence = 0;
   for (Ticker ticker(kPeriod); !over;) {
     ticker.wait();
     bus.drain();
     const std::int64_t now = monotonicNow();
     link.setTime(now);
     if (const auto command = link.takeCommand()) {
-      last = command->first;
-      heard = now;
+      if (!watchdog && command->first.engaged)
+        watchdog.emplace(experiment.plant.watchdog, command->first.rest, home);
+      if (watchdog) watchdog->take(command->first, now);
     }
-    if (last.engaged)
-      legs.follow(whileSilent(last, home, experiment.plant.watchdog, now - heard));
+    if (watchdog)
+      legs.follow(watchdog->reference(now));
     else
       legs.stay();
     sample_t sample{};

@@ -81,12 +81,15 @@ class Machine:
         self.command, self.heard = new, time.monotonic_ns()
 
     def reference(self):
-        """Of the legs: the command, or slowly home when nobody commands any more; None: stay."""
+        """Of the legs: the command; its `rest` when silence begins, then slowly home; None: stay."""
         if not self.command or not self.command.engaged:
             return None
-        silent = time.monotonic_ns() - self.heard - self.setup.park_after_ns
-        share = min(1.0, max(0, silent) / self.setup.park_time_ns) if self.command.park else 0.0
-        return [r + share * (h - r) for r, h in zip(self.command.counts, self.setup.leg_home)]
+        silent = time.monotonic_ns() - self.heard
+        if silent < self.setup.hold_after_ns:
+            return self.command.counts
+        late = silent - self.setup.park_after_ns
+        share = min(1.0, max(0, late) / self.setup.park_time_ns) if self.command.park else 0.0
+        return [r + share * (h - r) for r, h in zip(self.command.rest, self.setup.leg_home)]
 
     def sample(self):
         last = self.command.header if self.command else header_t()

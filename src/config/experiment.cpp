@@ -89,6 +89,7 @@ Experiment build(const Value& document) {
   c.geometry = readGeometry(root.section("platform"));
   Section leg_section = root.section("legs");
   Section watchdog = leg_section.section("watchdog");
+  p.watchdog.hold_after = c.period * watchdog.integer("hold_after_ticks", 1, 1000);
   p.watchdog.park_after = readTime(watchdog, "park_after_s");
   p.watchdog.park_time = std::max<std::int64_t>(1, readTime(watchdog, "park_time_s"));
   watchdog.finish();
@@ -107,18 +108,20 @@ Experiment build(const Value& document) {
   c.servo = plant::nominalServo(legs.gains, legs.actuator, legs.transducer);
   c.servo.sensor_cutoff = sensor.model.cutoff;
   if (sensor.readings > 1) {
-    if (c.period % (2 * sensor.readings) != 0)
-      root.fail("sensor", fmt::format("readings_per_tick: {} readings and their middles do not "
-                                      "divide the controller's period of {} ns evenly",
-                                      sensor.readings, c.period));
-    c.servo.sensor_window = c.periodSeconds();
+    // To whole ns, so that each part has a middle.
     p.sensor_readings = sensor.readings;
-    p.sensor_window = c.period;
+    p.sensor_window = c.period / (2 * sensor.readings) * 2 * sensor.readings;
+    c.servo.sensor_window = static_cast<double>(p.sensor_window) * kSecondPerNanosecond;
   }
   c.servo.jitter = c.compensation.jitter;
   if (root.has("servo")) {
     const ServoRecord record = readServo(root.section("servo"));
     c.servo = withRecord(c.servo, record);
+    if (const double most = ModelledServos::kMostDelay * c.periodSeconds();
+        !(c.servo.delay.maxCoeff() <= most))
+      root.fail("servo", fmt::format("delay_s of {:.4g} s, want at most {:.4g} s: {} periods of the "
+                                     "controller",
+                                     c.servo.delay.maxCoeff(), most, ModelledServos::kMostDelay));
     c.compensation = withRecord(c.compensation, record);
   }
   c.safety =

@@ -61,7 +61,7 @@ SafetyLimits readSafety(Section s, const Geometry& geometry, const WorkspaceUse&
   l.flow = s.number("flow_l_per_s", kTiny, 1e3) * kLitre;
   l.stale_ticks = static_cast<int>(s.integer("stale_ticks", 0, 1000));
   l.stall_ticks = static_cast<int>(s.integer("stall_ticks", 0, 1000));
-  l.overruns = static_cast<int>(s.integer("overruns_per_second", 0, 1000));
+  l.overruns = static_cast<int>(s.integer("overruns_per_second", 0, kMostOverruns));
   const auto counts = [&](const char* key) {
     return static_cast<int>(std::lround(s.number(key, -10.0, 10.0) / volts_per_count));
   };

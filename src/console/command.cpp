@@ -203,6 +203,7 @@ const std::vector<Item>& menu() {
       {Verb::kCollect, "collect", "FILE [SECONDS [HZ [NAME...]]]", "variables to a CSV file"},
       {Verb::kStatus, "status", "", "where everything is"},
       {Verb::kHold, "hold", "", "brake and stay"},
+      {Verb::kStop, "stop", "", "brake, home, let go: the run is over"},
       {Verb::kReset, "reset", "", "out of a stop, back to disarmed"},
       {Verb::kCompensate, "compensate", "", "lag and inertia out, as far as configured"},
       {Verb::kUncompensate, "uncompensate", "", "as published again"},
@@ -262,6 +263,7 @@ Command parseCommand(const std::string& line, const Experiment& experiment) {
     case Verb::kReset: order.request = Request::kReset; break;
     case Verb::kCompensate: order.request = Request::kCompensate; break;
     case Verb::kUncompensate: order.request = Request::kUncompensate; break;
+    case Verb::kStop:
     case Verb::kQuit: order.request = Request::kStop; break;
     case Verb::kRobot: command.robot = robotMove(words, experiment); break;
     case Verb::kTool: command.robot = toolPath(words, experiment); break;

@@ -18,10 +18,11 @@ AdmittanceControl::AdmittanceControl(const ControllerConfig& config)
       growth_floor_(config.safety.growth_floor),
       braking_(config.gentle.braking) {}
 
-void AdmittanceControl::begin(const Vec6& x, const Mat6& M_1, double age) noexcept {
-  model_.reset(x, M_1, inertia_ ? age + wrench_delay_ : 0.0);
+void AdmittanceControl::begin(const Vec6& x, const Mat6& M_1, double age, double share) noexcept {
+  model_.reset(x, M_1, inertia_ ? age + share * wrench_delay_ : 0.0);
   begins_ = true;
   oscillation_.reset();
+  port_.reset();
   energy_.reset();
 }
 

@@ -15,12 +15,14 @@ JointReaction::JointReaction(const ControllerConfig& config)
       filter_(config.servo.sensor_cutoff) {}
 
 Wrench JointReaction::update(const KnownPayload& known, const Sample& sample) noexcept {
-  if (known_ > 0 && sample.joints_time <= last_[2].time) known_ = 0;
+  if (known_ > 0 && sample.joints_time < last_[2].time) known_ = 0;
+  if (known_ > 0 && sample.joints_time == last_[2].time) return newest(sample.wrench_time);
   std::rotate(last_.begin(), last_.begin() + 1, last_.end());
   last_[2] = {sample.joints_time, sample.q};
   if (known_ < 3 && ++known_ < 3) {
     filter_.settle(Eigen::Array<double, 6, 1>::Zero());
     input_.setZero();
+    rate_.setZero();
     return {};
   }
   const auto seconds = [](std::int64_t from, std::int64_t to) {
@@ -36,12 +38,18 @@ Wrench JointReaction::update(const KnownPayload& known, const Sample& sample) no
   joints.q_ddot = 2.0 / (T_0 + T_1) * (rate_1 - rate_0);
   const Vec6 before = input_;
   input_ = reaction(known, joints);
+  rate_ = (input_ - before) / T_0;
   filter_.advance(filter_.prepare(T_0), input_.array());
+  return newest(sample.wrench_time);
+}
 
-  const double ahead = std::max(0.0, seconds(last_[1].time, sample.wrench_time));
+Wrench JointReaction::newest(std::int64_t time) const noexcept {
+  if (known_ < 3) return {};
+  const double ahead =
+      std::max(0.0, static_cast<double>(time - last_[1].time) * kSecondPerNanosecond);
   if (!(ahead > 0.0)) return Wrench::from(filter_.output().matrix());
   Butterworth2<6> now = filter_;
-  now.advance(now.prepare(ahead), (input_ + ahead / T_0 * (input_ - before)).array());
+  now.advance(now.prepare(ahead), (input_ + ahead * rate_).array());
   const Vec6 y_0 = filter_.output(), y_1 = now.output(), rate = now.rate();
   if (!(window_ > 0.0)) return Wrench::from(y_1 - delay_ * rate);
   return Wrench::from(0.5 * (y_0 + y_1) - delay_ / ahead * (y_1 - y_0));

@@ -10,37 +10,57 @@ LegCommander::LegCommander(const ControllerConfig& config)
       leg_min_(config.safety.leg_min),
       leg_max_(config.safety.leg_max) {}
 
-void LegCommander::command(const LegMotion& legs, bool engaged, std::int32_t segment, double lead,
-                           double share, const ServoObserver& servo, double age) noexcept {
-  legs_ = legs;
-  command_.engaged = engaged;
-  command_.segment = segment;
-  if (!legs.L.allFinite()) return;
-  reference_ = referenceOf(legs, lead, share, servo, age);
+void LegCommander::send(const Checked& next, std::int32_t segment, double share,
+                        const ServoObserver& servo, double age) noexcept {
+  if (!next.passes()) {
+    hold();
+    return;
+  }
+  legs_ = next.proposal().legs;
+  ahead_ = next.proposal().x.ahead;
+  reference_ = referenceOf(legs_, ahead_, share, servo, age);
   // What rounding leaves goes with the next command; at rest it would only make the legs hum.
-  const bool carries = compensation_.observer && share == 1.0 && lead > 0.0;
+  const bool carries = compensation_.observer && share == 1.0 && ahead_ > 0.0;
   if (!carries) rounding_residual_.setZero();
+  command_.engaged = true;
+  command_.segment = segment;
   command_.counts = legCounts(codec_, reference_ + rounding_residual_);
+  command_.rest = legCounts(codec_, legs_.L);
+  command_.ahead = std::llround(ahead_ * 1e9);
   rounding_residual_ += reference_ - legLengths(codec_, command_.counts);
 }
 
 void LegCommander::hold() noexcept {
   legs_.L_dot.setZero();
   legs_.L_ddot.setZero();
+  ahead_ = 0.0;
+  reference_ = legs_.L;
+  rounding_residual_.setZero();
+  command_.counts = command_.rest;
+  command_.ahead = 0;
 }
 
-Vec6 LegCommander::expected(double lead, double share) const noexcept {
+void LegCommander::release(const LegMotion& legs) noexcept {
+  command_.engaged = false;
+  command_.segment = -1;
+  if (legs.L.allFinite()) {
+    legs_ = legs;
+    command_.rest = legCounts(codec_, legs.L);
+  }
+  hold();
+}
+
+Vec6 LegCommander::expected(double share) const noexcept {
   if (!compensation_.feed_forward) return legs_.L;
-  return legs_.L + share * (period_ - lead) * legs_.L_dot;
+  return legs_.L + share * (period_ - ahead_) * legs_.L_dot;
 }
 
-/// The legs' lengths, or what takes the legs there. Inside the limits in any case: should no
-/// further command come, the legs end where they were told.
-Vec6 LegCommander::referenceOf(const LegMotion& legs, double lead, double share,
+/// The legs' lengths, or what takes the legs there; inside the limits in any case.
+Vec6 LegCommander::referenceOf(const LegMotion& legs, double ahead, double share,
                                const ServoObserver& servo, double age) const noexcept {
   if (!compensation_.any()) return legs.L;
   Vec6 L = legs.L;
-  if (compensation_.feed_forward) L = feedForward(servo.model(), legs, lead, period_, share);
+  if (compensation_.feed_forward) L = feedForward(servo.model(), legs, ahead, period_, share);
   if (compensation_.observer && command_.engaged) L += share * servo.rounding(legs.L_dot, age);
   return L.cwiseMax(leg_min_).cwiseMin(leg_max_);
 }

@@ -43,7 +43,7 @@ void Overruns::take(std::int64_t tick, std::int64_t missed) noexcept {
 bool Overruns::good(const SafetyLimits& limits, std::int64_t ticks_per_second) const noexcept {
   if (missed_ > limits.stall_ticks) return false;
   const auto allowed = static_cast<std::size_t>(limits.overruns);
-  if (allowed >= kKept || count_ <= allowed) return true;
+  if (count_ <= allowed) return true;
   // The one that would be too many, counted back from the last.
   return tick_ - late_[(count_ - 1 - allowed) % kKept] > ticks_per_second;
 }

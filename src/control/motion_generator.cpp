@@ -6,56 +6,60 @@
 
 namespace ves {
 
-void MotionGenerator::begin(const Segment& segment, std::int64_t tick, const Mat6& M_1,
-                            double age) noexcept {
+void MotionGenerator::begin(const Segment& segment, std::int64_t tick, const Mat6& M_1, double age,
+                            double share) noexcept {
   segment_ = segment;
-  plan_ = planned(segment);
-  n_ = 0;
+  follow(planned(segment));
   start_tick_ = tick;
-  if (segment.kind == SegmentKind::kAdmittance) admittance_.begin(motion_.x, M_1, age);
+  if (segment.kind == SegmentKind::kAdmittance) admittance_.begin(motion_.x, M_1, age, share);
 }
 
 void MotionGenerator::brake(const Braking& braking) noexcept {
   segment_ = {};
   segment_.kind = SegmentKind::kMove;
-  plan_ = MotionPlan::brake(settings_, motion_, braking);
-  n_ = 0;
+  follow(MotionPlan::brake(settings_, motion_, braking));
 }
 
 void MotionGenerator::goHome() noexcept {
   segment_ = {};
   segment_.kind = SegmentKind::kMove;
-  plan_ = MotionPlan::move(settings_, motion_, Vec6::Zero(), 0.0);
+  follow(MotionPlan::move(settings_, motion_, Vec6::Zero(), 0.0));
+}
+
+/// From where and when the motion was meant; at rest it may as well be now.
+void MotionGenerator::follow(const MotionPlan& plan) noexcept {
+  plan_ = plan;
   n_ = 0;
+  ahead_ = moving() ? motion_.ahead : 0.0;
 }
 
-PathPoint<6> MotionGenerator::admittanceModel(const AdmittanceInput& in,
-                                              const PathChecks& checks) noexcept {
+Waypoint<6> MotionGenerator::admittanceModel(const AdmittanceInput& in,
+                                             const PathChecks& checks) noexcept {
   ++n_;
-  return admittance_.step(in, motion_.x, checks);
+  return {admittance_.step(in, motion_.x, checks), settings_.period};
 }
 
-PathPoint<6> MotionGenerator::trajectoryGeneration() noexcept {
+Waypoint<6> MotionGenerator::trajectoryGeneration() noexcept {
   ++n_;  // where a plan starts, the platform is already
   switch (segment_.kind) {
     case SegmentKind::kMove:
     case SegmentKind::kTrajectory:
-    case SegmentKind::kPath: return plan_.at(n_, path_);
+    case SegmentKind::kPath: return {plan_.at(n_, path_), ahead_};
     case SegmentKind::kCalibration:
     case SegmentKind::kMonitor:
     case SegmentKind::kAdmittance:
     case SegmentKind::kCount: break;
   }
-  return atRest(motion_.x);
+  return {atRest(motion_.x)};
 }
 
-void MotionGenerator::commit(const PathPoint<6>& x, bool next_state) noexcept {
-  desired_ = next_state ? motion_.x : x.x;
+void MotionGenerator::commit(const Waypoint<6>& x) noexcept {
+  desired_ = x.ahead > 0.0 ? motion_.x : x.x;
   motion_ = x;
 }
 
 void MotionGenerator::hold() noexcept {
-  motion_ = atRest(motion_.x);
+  motion_ = {atRest(motion_.x)};
   admittance_.forget();
 }
 

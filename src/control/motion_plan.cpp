@@ -81,7 +81,7 @@ PathPoint<6> MotionPlan::at(std::int64_t n, const RecordedPath& path) const noex
 
 void Rehearsal::begin(const MotionPlan& plan, const Vec6& L) noexcept {
   plan_ = plan;
-  n_ = 0;
+  n_ = last_ = 0;
   L_last_ = L;
   failure_ = Check::kCount;
   under_way_ = true;
@@ -90,17 +90,19 @@ void Rehearsal::begin(const MotionPlan& plan, const Vec6& L) noexcept {
 void Rehearsal::advance(const PathChecks& checks, double period,
                         const RecordedPath& path) noexcept {
   const std::int64_t stride = std::max<std::int64_t>(1, plan_.steps() / kPoses);
-  const std::int64_t until = std::min(plan_.steps(), n_ + (kPosesATick - 1) * stride);
-  for (; n_ <= until; n_ += stride) {
+  for (std::int64_t poses = 0; poses < kPosesATick && n_ <= plan_.steps(); ++poses) {
     const PathPoint<6> at = plan_.at(n_, path);
     const Pose x = Pose::from(at.x);
     const BodyMotion P = bodyMotion(checks.geometry(), x, at.x_dot, at.x_ddot);
     const LegMotion legs = legMotion(checks.geometry(), P);
     // From one sample to the next, and at the sample itself.
-    const double since = static_cast<double>(n_ == 0 ? 1 : stride) * period;
+    const double since = static_cast<double>(std::max<std::int64_t>(1, n_ - last_)) * period;
     const Tripped t = checks.pose(P.X, x, legs.L) | checks.step(legs.L, L_last_, since) |
                       checks.step(legs.L + period * legs.L_dot, legs.L, period);
     L_last_ = legs.L;
+    last_ = n_;
+    // The last pose too, whatever the stride.
+    n_ = n_ < plan_.steps() ? std::min(n_ + stride, plan_.steps()) : n_ + 1;
     if (!t.any()) continue;
     failure_ = t.first();
     break;

@@ -43,6 +43,7 @@ std::string_view name(Request request) noexcept {
     case Request::kReset: return "reset";
     case Request::kCompensate: return "compensate";
     case Request::kUncompensate: return "uncompensate";
+    case Request::kOvertaken: return "overtaken";
     case Request::kCount: break;
   }
   return "unknown";
@@ -62,6 +63,7 @@ std::string_view name(Refusal refusal) noexcept {
     case Refusal::kUnassessed: return "the stability of this loop has not been checked";
     case Refusal::kLoaded: return "the measured wrench is too large: calibrate, or remove the load";
     case Refusal::kChecking: return "its path is being checked";
+    case Refusal::kOvertaken: return "a hold, a stop or a failing check came before it";
     case Refusal::kCount: break;
   }
   return "unknown";

@@ -69,9 +69,13 @@ RobotInertia::RobotInertia(const ControllerConfig& config)
 Wrench RobotInertia::update(const KnownPayload& known, std::int64_t count, const JointVector& q,
                             const Transform& X_IP, const LegMotion& legs, bool engaged,
                             double share) noexcept {
-  if (!compensated_ || !engaged) return {};
-  if (count % mass_update_ == 0 || known.changed())
+  if (!compensated_ || !engaged) {
+    known_ = false;
+    return {};
+  }
+  if (!known_ || count % mass_update_ == 0 || known.changed())
     composite_P_ = combine(RigidBody{}, known.payload().X_PL0(), compositeBody(known.carried(), q));
+  known_ = true;
   M_1_ = share * scale_ * spatialMass(rotated(X_IP.R, composite_P_));
   BodyMotion P;
   if (!forwardMotion(geometry_, X_IP, legs, P)) return {};

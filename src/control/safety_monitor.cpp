@@ -11,7 +11,7 @@ void SafetyMonitor::watch(const Elapsed& elapsed, const SampleStream& samples,
   if (samples.fresh()) frozen_.take(samples.sample().adc, static_counts);
 }
 
-Tripped SafetyMonitor::check(const Proposal& p, const LegContext& context,
+Checked SafetyMonitor::check(const Proposal& p, const LegContext& context,
                              const SampleStream& samples, const LegEstimator& legs,
                              const Wrench& dynamic, const Oscillation& oscillation,
                              bool conflict) const noexcept {
@@ -38,7 +38,7 @@ Tripped SafetyMonitor::check(const Proposal& p, const LegContext& context,
   t.require(Check::kSensorFrozen, frozen_.good(limits));
   t.require(Check::kOscillation, oscillation.good(limits));
   t.require(Check::kConflictingNode, !conflict);
-  return t;
+  return {p, t};
 }
 
 }  // namespace ves

@@ -8,6 +8,11 @@ void Tare::begin() noexcept {
   statistics_.reset();
 }
 
+void Tare::cancel(Vec6& bias) noexcept {
+  if (state_ == State::kRamping) bias = before_;
+  state_ = State::kNone;
+}
+
 void Tare::step(const Sample& sample, bool fresh, const Vec6& static_counts, Vec6& bias) noexcept {
   switch (state_) {
     case State::kNone: return;
@@ -19,6 +24,7 @@ void Tare::step(const Sample& sample, bool fresh, const Vec6& static_counts, Vec
         state_ = State::kNone;  // no stray voltage: a load, or a fault
         return;
       }
+      before_ = bias;
       PathPoint<6> from;
       from.x = bias;
       path_ = Quintic<6>(from, statistics_.mean(), ramp_);

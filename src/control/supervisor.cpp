@@ -27,9 +27,9 @@ Refusal refusesLoop(Stability stability) {
 
 void Supervisor::handle(const Order& order, const Situation& now, Actuation act) noexcept {
   if (order.request == Request::kNone) return;
-  order_ = order.id;
-  refusal_ = obey(order, now, act);
-  if (refusal_ == Refusal::kChecking) rehearsed_ = order;
+  const Refusal refusal = obey(order, now, act);
+  if (refusal == Refusal::kChecking) rehearsed_ = order;
+  answers_.give({order.id, refusal, Check::kCount});
 }
 
 Refusal Supervisor::obey(const Order& order, const Situation& now, Actuation act) noexcept {
@@ -38,16 +38,17 @@ Refusal Supervisor::obey(const Order& order, const Situation& now, Actuation act
     case Request::kCount: return Refusal::kNone;
     case Request::kArm:
     case Request::kStart: return arm(order.request, now, act);
+    case Request::kOvertaken: return Refusal::kOvertaken;
     case Request::kStop:
       pending_request_ = Request::kNone;
-      rehearsal_.cancel();
+      forgetRehearsal();
       if (phase_ == Phase::kArmed || phase_ == Phase::kRunning) beginReturn(now, act);
       operator_present_ = false;
       return Refusal::kNone;
     case Request::kRun: return run(order.segment, now, act);
     case Request::kHold:
       pending_request_ = Request::kNone;
-      rehearsal_.cancel();
+      forgetRehearsal();
       if (!ours()) return Refusal::kNotArmed;
       operator_present_ = true;
       if (phase_ == Phase::kArmed) return Refusal::kNone;
@@ -93,7 +94,8 @@ Refusal Supervisor::arm(Request request, const Situation& now, Actuation act) no
 /// Begins an order's segment; one with a path once that has been gone through.
 Refusal Supervisor::run(const Segment& segment, const Situation& now, Actuation act) noexcept {
   if (!ours()) return Refusal::kNotArmed;
-  if (phase_ != Phase::kArmed || rehearsal_.underWay()) return Refusal::kBusy;
+  if (phase_ != Phase::kArmed || rehearsal_.underWay() || pending_request_ == Request::kStart)
+    return Refusal::kBusy;
   if (segment.kind == SegmentKind::kAdmittance) {
     const Refusal refusal = refusesAdmittance(now, act);
     if (refusal != Refusal::kNone) return refusal;
@@ -112,14 +114,19 @@ void Supervisor::rehearse(const Situation& now, Actuation act) noexcept {
   if (!rehearsal_.underWay()) return;
   rehearsal_.advance(now.path, now.config.periodSeconds(), act.motion.path());
   if (rehearsal_.underWay()) return;
-  order_ = rehearsed_.id;
   if (rehearsal_.failure() == Check::kCount) {
-    refusal_ = Refusal::kNone;
+    answers_.give({rehearsed_.id, Refusal::kNone, Check::kCount});
     begin(rehearsed_.segment, now, act);
   } else {
-    refusal_ = Refusal::kOutside;
-    refused_by_ = rehearsal_.failure();
+    answers_.give({rehearsed_.id, Refusal::kOutside, rehearsal_.failure()});
   }
+}
+
+/// A path that was being gone through is not begun.
+void Supervisor::forgetRehearsal() noexcept {
+  if (!rehearsal_.underWay()) return;
+  rehearsal_.cancel();
+  answers_.give({rehearsed_.id, Refusal::kOvertaken, Check::kCount});
 }
 
 /// A loop that runs is not changed to one that would diverge.
@@ -194,8 +201,7 @@ void Supervisor::endSegment(const Situation& now, Actuation act) noexcept {
   const bool in_program = segment_ >= 0;
   if (in_program && act.motion.kind() == SegmentKind::kCalibration &&
       act.bias.calibration().status() == Calibration::Status::kRefused) {
-    aborted_ = true;  // a program does not go on without the calibration it asked for
-    beginReturn(now, act);
+    abort(Refusal::kNone, now, act);  // it does not go on without what it asked for
   } else if (act.motion.moving() && !nextBrakes(now.config.program)) {
     act.motion.brake(now.config.gentle.braking);
   } else if (in_program) {
@@ -215,7 +221,10 @@ bool Supervisor::nextBrakes(const Program& program) const noexcept {
 
 void Supervisor::beginProgram(int at, const Situation& now, Actuation act) noexcept {
   segment_ = at;
-  if (at == 0) aborted_ = false;
+  if (at == 0) {
+    aborted_ = false;
+    aborted_by_ = Refusal::kNone;
+  }
   if (at >= now.config.program.size) {
     beginReturn(now, act);
     return;
@@ -224,17 +233,22 @@ void Supervisor::beginProgram(int at, const Situation& now, Actuation act) noexc
   const Refusal refusal =
       next.kind == SegmentKind::kAdmittance ? refusesAdmittance(now, act) : Refusal::kNone;
   if (refusal != Refusal::kNone) {
-    refusal_ = refusal;
-    aborted_ = true;
-    beginReturn(now, act);
+    abort(refusal, now, act);
     return;
   }
   begin(next, now, act);
 }
 
+/// The program goes home early.
+void Supervisor::abort(Refusal why, const Situation& now, Actuation act) noexcept {
+  aborted_ = true;
+  aborted_by_ = why;
+  beginReturn(now, act);
+}
+
 void Supervisor::begin(const Segment& segment, const Situation& now, Actuation act) noexcept {
   phase_ = Phase::kRunning;
-  act.motion.begin(segment, now.tick, now.M_1, now.age);
+  act.motion.begin(segment, now.tick, now.M_1, now.age, act.share.value());
   if (segment.kind == SegmentKind::kCalibration) act.bias.beginCalibration();
 }
 
@@ -247,11 +261,7 @@ void Supervisor::beginReturn(const Situation& now, Actuation act) noexcept {
 bool Supervisor::trip(Tripped tripped, const Situation& now, Actuation act) noexcept {
   tripped_ = tripped;
   if (phase_ == Phase::kDisarmed || !tripped.any()) return false;
-  if (rehearsal_.underWay()) {
-    rehearsal_.cancel();
-    order_ = rehearsed_.id;
-    refusal_ = Refusal::kNotArmed;
-  }
+  forgetRehearsal();
   latch(tripped, act);
   if (phase_ == Phase::kStopped) return false;
   const bool stopping = phase_ == Phase::kStopping;
@@ -280,13 +290,15 @@ void Supervisor::latch(Tripped tripped, Actuation act) noexcept {
   act.bias.cancelTare();  // what it averages may be the fault
 }
 
-void Supervisor::report(TickState& state) const noexcept {
+void Supervisor::report(TickState& state) noexcept {
+  answers_.advance();
   state.phase = phase_;
   state.segment = segment_;
-  state.order = order_;
-  state.refusal = refusal_;
-  state.refused_by = refused_by_;
+  state.order = answers_.shown().order;
+  state.refusal = answers_.shown().refusal;
+  state.refused_by = answers_.shown().refused_by;
   state.aborted = aborted_;
+  state.aborted_by = aborted_by_;
   state.tripped = tripped_;
   state.latched = latched_;
   state.cause = cause_;

@@ -72,23 +72,24 @@ const TickState& TestPlatform::tick(const TickInput& in) noexcept {
   supervisor_.handle(in.order, now, act);
   supervisor_.advance(now, act);
 
-  Proposal next = inverseKinematics(config_.geometry, nextMotion(W.dynamic));  // (C.11), (C.12)
-  if (supervisor_.trip(safetyChecks(next, W.dynamic, in.conflicting_node), now, act)) {
-    next = inverseKinematics(config_.geometry, nextMotion(W.dynamic));  // begins to brake
-    supervisor_.tripStopping(safetyChecks(next, W.dynamic, in.conflicting_node), act);
+  const auto proposed = [&] {
+    const Proposal next = inverseKinematics(config_.geometry, nextMotion(W.dynamic));
+    return safetyChecks(next, W.dynamic, in.conflicting_node);
+  };
+  Checked next = proposed();  // (C.11), (C.12)
+  if (supervisor_.trip(next.tripped(), now, act)) {
+    next = proposed();  // begins to brake
+    supervisor_.tripStopping(next.tripped(), act);
   }
-  if (supervisor_.stopped())
-    hold();
-  else
-    legCommunication(next);  // (C.13)
+  legCommunication(next);  // (C.13)
   legs_.sent(commander_.command().counts, in.tick, in.time);
   return report(W);
 }
 
 /// The admittance model (C.2) to (C.7), trajectory generation (C.8) to (C.10), or rest.
-PathPoint<6> TestPlatform::nextMotion(const Wrench& dynamic) noexcept {
+Waypoint<6> TestPlatform::nextMotion(const Wrench& dynamic) noexcept {
   const Sample& sample = samples_.sample();
-  if (supervisor_.stopped()) hold();
+  if (supervisor_.stopped()) motion_.hold();
   if (supervisor_.runs(motion_, SegmentKind::kCalibration))
     bias_.calibrate(sample, samples_.fresh(), load_.counts());
   if (supervisor_.runs(motion_, SegmentKind::kAdmittance))
@@ -100,37 +101,32 @@ PathPoint<6> TestPlatform::nextMotion(const Wrench& dynamic) noexcept {
   // Until the legs follow, they are where they are measured.
   const bool at_measured = supervisor_.disarmed() ||
                            (supervisor_.phase() == Phase::kArmed && !commander_.command().engaged);
-  return atRest(at_measured ? legs_.measured().pose.stacked() : motion_.motion().x);
+  return {atRest(at_measured ? legs_.measured().pose.stacked() : motion_.motion().x)};
 }
 
-Tripped TestPlatform::safetyChecks(const Proposal& next, const Wrench& dynamic,
+Checked TestPlatform::safetyChecks(const Proposal& next, const Wrench& dynamic,
                                    bool conflict) const noexcept {
   // Before the legs follow, the last command is where they are.
   LegContext context{next.legs.L, legs_.measured().L};
   if (commander_.command().engaged) {
     context.last = commander_.legs().L;
-    context.expected = supervisor_.stopped() ? commander_.reference()
-                                             : commander_.expected(lead(), share_.value());
+    context.expected = commander_.expected(share_.value());
   }
   return safety_.check(next, context, samples_, legs_, dynamic, motion_.admittance().oscillation(),
                        conflict);
 }
 
-void TestPlatform::legCommunication(const Proposal& next) noexcept {
-  motion_.commit(next.x, lead() > 0.0);
-  commander_.command(next.legs, !supervisor_.disarmed(), supervisor_.segment(), lead(),
-                     share_.value(), legs_.servo(), legs_.age(time_));
-}
-
-/// [s] after this tick for which a command is meant: the admittance model determines the next
-/// state, everything else says where to be now.
-double TestPlatform::lead() const noexcept {
-  return supervisor_.runs(motion_, SegmentKind::kAdmittance) ? period_ : 0.0;
-}
-
-void TestPlatform::hold() noexcept {
-  motion_.hold();
-  commander_.hold();
+void TestPlatform::legCommunication(const Checked& next) noexcept {
+  if (supervisor_.stopped() || !(supervisor_.disarmed() || next.passes())) {
+    motion_.hold();
+    commander_.hold();
+    return;
+  }
+  motion_.commit(next.proposal().x);
+  if (supervisor_.disarmed())
+    commander_.release(next.proposal().legs);
+  else
+    commander_.send(next, supervisor_.segment(), share_.value(), legs_.servo(), legs_.age(time_));
 }
 
 const TickState& TestPlatform::report(const Wrenches& W) noexcept {

@@ -78,7 +78,7 @@ FaultOutcome run(const Experiment& e, const Expectation& expected) {
         as_expected && std::count(expected.causes.begin(), expected.causes.end(), result.cause) > 0;
   } else {
     out.what = fmt::format("{}{} after {} ticks, at most {:.0f} mm from home", name(result.phase),
-                           result.aborted ? fmt::format(" early ({})", name(last.refusal)) : "",
+                           result.aborted ? fmt::format(" early ({})", name(last.aborted_by)) : "",
                            result.ticks, farthest * 1e3);
   }
   for (const Check check : expected.with) as_expected = as_expected && last.latched.has(check);

@@ -13,10 +13,19 @@ constexpr std::int64_t kMidUpdate = kUpdatePeriod / 2;  // [ns]
 constexpr double kStillSpeed = 1e-9;                    // [m/s]
 constexpr std::int64_t kSettle = 100'000'000;           // [ns] between checks whether all is still
 
+LegCounts countsAt(const PlantConfig& config, const Pose& pose) {
+  const Vec6 L = legLengths(config.geometry, config.geometry.fromHome(pose));
+  LegCounts out;
+  for (std::size_t i = 0; i < kLegs; ++i)
+    out[i] = config.transducer.count(L(static_cast<Eigen::Index>(i)));
+  return out;
+}
+
 }  // namespace
 
 Plant::Plant(const PlantConfig& config)
     : config_(config),
+      watchdog_(config.watchdog, countsAt(config, config.initial_pose), countsAt(config, {})),
       sensor_(config.sensor, Noise(config.seed)),
       filter_position_(config.filter_cutoff),
       filter_velocity_(config.filter_cutoff),
@@ -34,15 +43,14 @@ Plant::Plant(const PlantConfig& config)
   robot_event_done_.assign(config_.robot_events.size(), false);
   injectors_.resize(config_.faults.size());
   began_.fill(kNever);
-  const Vec6 L_home = legLengths(config_.geometry, config_.geometry.fromHome({}));
   for (int i = 0; i < kLegs; ++i) {
-    home_[static_cast<std::size_t>(i)] = config_.transducer.count(L_home(i));
     const double L = truth_.legs.L(i);
-    const std::int32_t count = config_.transducer.count(L);
     actuators_.emplace_back(config_.actuator, L);
-    slaves_.emplace_back(config_.leg_slave, count);
-    reference_[static_cast<std::size_t>(i)] = count;
+    slaves_.emplace_back(config_.leg_slave, config_.transducer.count(L));
   }
+  for (const FaultEvent& event : config_.faults)
+    if (event.fault == Fault::kValveStuck || event.fault == Fault::kRunaway)
+      valve_faults_.push_back(event);
   filter_position_.settle(truth_.legs.L.array());
   filter_velocity_.settle(Vec6::Zero().array());
   filter_acceleration_.settle(Vec6::Zero().array());
@@ -61,22 +69,22 @@ Plant::Plant(const PlantConfig& config)
 }
 
 void Plant::command(const LegCommand& command) noexcept {
-  if (!command.engaged) {  // somebody is there, and waits
-    if (heard_ != kNever) heard_ = now_;
+  watchdog_.take(command, now_);
+  if (!command.engaged) return;
+  if (command.segment < 0) {  // an operator's order: what the program began goes on
+    outside_ = true;
+    next_robot_event_ = kNever;
     return;
   }
-  reference_ = command.counts;
-  heard_ = now_;
-  may_park_ = command.park;
-  truth_.parking = false;
-  if (command.segment == segment_) return;
-  if (command.segment < segment_) {  // a program begins anew
+  if (command.segment == segment_ && !outside_) return;
+  if (command.segment < segment_ || outside_) {  // a program begins anew
     robot_event_done_.assign(robot_event_done_.size(), false);
     began_.fill(kNever);
   }
+  outside_ = false;
   segment_ = command.segment;
   segment_start_ = now_;
-  if (segment_ >= 0) began_[static_cast<std::size_t>(segment_)] = now_;
+  began_[static_cast<std::size_t>(segment_)] = now_;
   planRobotEvent();
 }
 
@@ -131,7 +139,7 @@ void Plant::skip(std::int64_t until) noexcept {
   const std::int64_t time = (until - now_ - 1'000'000'000) / kUpdatePeriod * kUpdatePeriod;
   now_ += time;
   last_step_ += time;
-  if (heard_ != kNever) heard_ += time;  // who asks for such a leap would have gone on commanding
+  watchdog_.skip(time);
   next_reading_ += time;
   if (next_step_ != kNever) next_step_ += time;
   if (next_sensor_ != kNever) next_sensor_ += time;
@@ -185,7 +193,7 @@ bool Plant::now(const Cue& cue, std::int64_t duration) const noexcept {
 /// [A] through a valve.
 double Plant::current(std::size_t leg) const noexcept {
   double amperes = slaves_[leg].current();
-  for (const FaultEvent& event : config_.faults) {
+  for (const FaultEvent& event : valve_faults_) {
     if (static_cast<std::size_t>(event.index) != leg || !now(event.cue, event.duration)) continue;
     if (event.fault == Fault::kValveStuck) amperes = 0.0;
     if (event.fault == Fault::kRunaway)
@@ -194,30 +202,11 @@ double Plant::current(std::size_t leg) const noexcept {
   return amperes;
 }
 
-/// The LegSlaves' own watchdog.
-void Plant::watch() noexcept {
-  if (heard_ == kNever || now_ - heard_ < config_.watchdog.park_after) return;
-  if (!may_park_) {
-    truth_.parking = false;
-    return;
-  }
-  if (!truth_.parking) {
-    truth_.parking = true;
-    parked_from_ = reference_;
-    heard_ = now_ - config_.watchdog.park_after;
-  }
-  const std::int64_t since = now_ - heard_ - config_.watchdog.park_after;
-  const double share =
-      std::min(1.0, static_cast<double>(since) / static_cast<double>(config_.watchdog.park_time));
-  for (std::size_t i = 0; i < kLegs; ++i)
-    reference_[i] = parked_from_[i] +
-                    static_cast<std::int32_t>(std::lround(share * (home_[i] - parked_from_[i])));
-}
-
 void Plant::readTransducers() noexcept {
-  watch();
+  const LegCounts& reference = watchdog_.reference(now_);
+  truth_.parking = watchdog_.parking();
   for (std::size_t i = 0; i < kLegs; ++i)
-    slaves_[i].read(config_.transducer.count(actuators_[i].length()), reference_[i]);
+    slaves_[i].read(config_.transducer.count(actuators_[i].length()), reference[i]);
   if (slaves_[0].updated()) next_step_ = now_ + kMidUpdate;
 }
 
@@ -352,7 +341,7 @@ Sample Plant::sample() noexcept {
     const FaultEvent& event = config_.faults[i];
     injectors_[i].apply(event, now(event.cue, event.duration), config_.sensor.volts_per_count, s);
   }
-  if ((s.switches & kAllSwitchesClosed) != kAllSwitchesClosed) may_park_ = false;
+  if ((s.switches & kAllSwitchesClosed) != kAllSwitchesClosed) watchdog_.loopOpened();
   return s;
 }
 

@@ -128,9 +128,9 @@ std::string whyEarly(const Series& series) {
                                   [](const Row& row) { return row.state.aborted != 0; });
   if (first == series.rows.end()) return {};
   const state_t& s = first->state;
-  if (s.refusal != 0)
+  if (s.aborted_by != 0)
     return fmt::format("a segment of the program was refused: {}",
-                       name(static_cast<Refusal>(s.refusal)));
+                       name(static_cast<Refusal>(s.aborted_by)));
   return fmt::format("the calibration was refused: {}", stirred(s, series.experiment));
 }
 

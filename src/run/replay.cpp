@@ -9,6 +9,7 @@
 
 #include "ves/base/build.hpp"
 #include "ves/realtime/realtime.hpp"
+#include "ves/transport/bus.hpp"
 #include "ves/transport/channels.hpp"
 #include "ves/transport/fields.hpp"
 
@@ -106,7 +107,13 @@ class Replayer {
 
   void keepSample() {
     const auto m = decoded<sample_t>();
-    if (const auto sample = fromMessage(m)) samples_.put(m.header.sequence, *sample);
+    const auto sample = fromMessage(m);
+    const bool alive = m.command_source == controller_ || m.header.signature[0] == 0;
+    const auto verdict = machine_.judge(m.header, alive, engaged_);
+    const bool first = machine_.source() == 0;  // in lockstep they have no epoch
+    if (!sample || (verdict == MachineHeard::Verdict::kAnother && !first)) return;
+    machine_.take(m.header);
+    samples_.put(m.header.sequence, *sample);
   }
 
   void keepOrder() {
@@ -117,7 +124,7 @@ class Replayer {
   Order orderOf(const state_t& recorded) const {
     Order order;
     order.request = static_cast<Request>(recorded.request);
-    order.id = {recorded.order_source, recorded.order_sequence};
+    order.id = {recorded.request_source, recorded.request_sequence};
     if (order.request != Request::kRun) return order;
     for (const Order& known : orders_)
       if (known.id.source == order.id.source && known.id.sequence == order.id.sequence)
@@ -155,6 +162,7 @@ class Replayer {
       in.sample = *sample;
     }
     pace();
+    engaged_ = recorded.engaged != 0;
     const TickState& state = platform_->tick(in);
     ++result_.ticks;
     note(recorded, toMessage(state, in, recorded.header));
@@ -214,6 +222,8 @@ class Replayer {
   std::int64_t controller_ = 0;  // source of the states
   std::int64_t period_ = 0;      // [ns]
   std::int64_t start_ = 0;       // [ns]
+  MachineHeard machine_;
+  bool engaged_ = false;  // by the last tick
   Recent<Sample> samples_;
   std::vector<Order> orders_;
   Recent<leg_command_t> recorded_commands_, replayed_commands_;

@@ -276,12 +276,12 @@ ControllerLink::ControllerLink(Bus& bus, const Identity& self) : bus_(bus), self
 void ControllerLink::receiveSample(const void* data, std::uint32_t size) noexcept {
   const auto message = decode<sample_t>(data, size);
   const auto sample = message ? fromMessage(*message) : std::nullopt;
-  const bool same =
-      message && message->header.source == plant_.source && message->header.epoch == plant_.epoch;
   const bool answers_us = message && message->command_source == self_.source;
   const bool alive = answers_us || !bus_.keyed();
-  const bool renewed =
-      message && !same && !engaged_ && alive && message->header.epoch > plant_.epoch;
+  const auto verdict = message ? machine_.judge(message->header, alive, engaged_)
+                               : MachineHeard::Verdict::kAnother;
+  const bool same = verdict == MachineHeard::Verdict::kSame,
+             renewed = verdict == MachineHeard::Verdict::kRenewed;
   if (sample && !same && !renewed && alive) conflict_ = true;
   const bool newer = same && sample && sample->sequence >= sample_.sequence;
   if (!sample || !(renewed || newer)) {
@@ -293,7 +293,7 @@ void ControllerLink::receiveSample(const void* data, std::uint32_t size) noexcep
     return;
   }
   if (!same) clock_ = ClockOffset();
-  plant_ = {message->header.source, message->header.epoch};
+  machine_.take(message->header);
   sample_ = *sample;
   answers_ = message->answers;
   sample_time_ = message->header.time_ns;
@@ -311,13 +311,22 @@ void ControllerLink::receiveOrder(const operator_t& message) noexcept {
   }
   for (const OrderId& id : known_)
     if (id.source == order->id.source && id.sequence == order->id.sequence) return;
-  if (order->request == Request::kStop || order->request == Request::kHold) waiting_ = 0;
-  if (waiting_ == kOrders) {
+  const bool at_once = order->request == Request::kStop || order->request == Request::kHold;
+  if (waiting_ >= (at_once ? 2 * kOrders : kOrders)) {
     ++rejected_;
     return;
   }
-  orders_[waiting_++] = *order;
-  known_[next_known_++ % kOrders] = order->id;
+  if (at_once) {
+    // At once; what waits is only answered.
+    for (std::size_t i = 0; i < waiting_; ++i) orders_[i].request = Request::kOvertaken;
+    std::move_backward(orders_.begin(), orders_.begin() + static_cast<std::ptrdiff_t>(waiting_),
+                       orders_.begin() + static_cast<std::ptrdiff_t>(waiting_ + 1));
+    orders_[0] = *order;
+    ++waiting_;
+  } else {
+    orders_[waiting_++] = *order;
+  }
+  known_[next_known_++ % known_.size()] = order->id;
 }
 
 Order ControllerLink::takeOrder() noexcept {
@@ -330,7 +339,7 @@ Order ControllerLink::takeOrder() noexcept {
 
 void ControllerLink::send(leg_command_t command) noexcept {
   engaged_ = command.engaged != 0;
-  command.machine = plant_.source;
+  command.machine = machine_.source();
   const std::int64_t sequence = command.header.sequence;
   sent_[static_cast<std::size_t>(sequence + 1) % sent_.size()] = {sequence, bus_.now()};
   bus_.publish(channel::kLegCommand, command);

@@ -41,6 +41,7 @@ constexpr double kMaxTime = 1e6;          // [s] of an order
 constexpr double kMaxTranslation = 10.0;  // [m]
 constexpr double kMaxRotation = 10.0;     // [rad]
 constexpr double kMaxFrequency = 1e3;     // [Hz]
+constexpr std::int64_t kMostAhead = 1'000'000'000;  // [ns] the longest period
 
 }  // namespace
 
@@ -89,6 +90,8 @@ leg_command_t toMessage(const LegCommand& command, const header_t& header) noexc
   m.segment = command.segment;
   m.park = command.park ? 1 : 0;
   std::copy(command.counts.begin(), command.counts.end(), m.counts);
+  std::copy(command.rest.begin(), command.rest.end(), m.rest);
+  m.ahead_ns = command.ahead;
   return m;
 }
 
@@ -99,6 +102,8 @@ state_t toMessage(const TickState& state, const TickInput& in, const header_t& h
   m.machine_time_ns = in.time;
   m.sample_sequence = state.sample_sequence;
   m.request = static_cast<std::int32_t>(in.order.request);
+  m.request_source = in.order.id.source;
+  m.request_sequence = in.order.id.sequence;
   m.order_source = state.order.source;
   m.order_sequence = state.order.sequence;
   m.refusal = static_cast<std::int32_t>(state.refusal);
@@ -141,6 +146,7 @@ state_t toMessage(const TickState& state, const TickInput& in, const header_t& h
   m.cause = static_cast<std::int32_t>(state.cause);
   m.cause_tick = state.cause_tick;
   m.aborted = state.aborted ? 1 : 0;
+  m.aborted_by = static_cast<std::int32_t>(state.aborted_by);
   m.envelope_scale = state.envelope_scale;
   m.energy_put_in = state.energy_put_in;
   m.energy_paid = state.energy_paid;
@@ -149,6 +155,8 @@ state_t toMessage(const TickState& state, const TickInput& in, const header_t& h
   m.engaged = state.command.engaged ? 1 : 0;
   m.park = state.command.park ? 1 : 0;
   std::copy(state.command.counts.begin(), state.command.counts.end(), m.counts);
+  std::copy(state.command.rest.begin(), state.command.rest.end(), m.rest);
+  m.ahead_ns = state.command.ahead;
   return m;
 }
 
@@ -271,6 +279,7 @@ setup_t setupOf(const Experiment& e, bool lockstep, const header_t& header) {
     m.joint_min[i] = c.payload.robot.jointLink(i).lower;
     m.joint_max[i] = c.payload.robot.jointLink(i).upper;
   }
+  m.hold_after_ns = e.plant.watchdog.hold_after;
   m.park_after_ns = e.plant.watchdog.park_after;
   m.park_time_ns = e.plant.watchdog.park_time;
   return m;
@@ -338,10 +347,13 @@ std::optional<LegCommand> fromMessage(const leg_command_t& m) noexcept {
   c.park = m.park != 0;
   bool good = inRange<std::int64_t>(m.header.sequence, -1, kMaxSequence) &&
               inRange(m.segment, -1, kMaxSegments) && inRange<int>(m.engaged, 0, 1) &&
-              inRange<int>(m.park, 0, 1);
+              inRange<int>(m.park, 0, 1) && inRange<std::int64_t>(m.ahead_ns, 0, kMostAhead);
+  c.ahead = m.ahead_ns;
   for (std::size_t i = 0; i < c.counts.size(); ++i) {
     c.counts[i] = m.counts[i];
-    good = good && inRange(m.counts[i], 0, plant::Temposonics::kMaxCount);
+    c.rest[i] = m.rest[i];
+    for (const std::int32_t count : {m.counts[i], m.rest[i]})
+      good = good && inRange(count, 0, plant::Temposonics::kMaxCount);
   }
   if (!good) return {};
   return c;
@@ -404,7 +416,7 @@ std::optional<RobotOrder> fromMessage(const robot_command_t& m) noexcept {
 }
 
 std::optional<Order> fromMessage(const operator_t& m) noexcept {
-  if (!inRange(m.request, 1, static_cast<int>(Request::kCount) - 1)) return {};
+  if (!inRange(m.request, 1, static_cast<int>(Request::kUncompensate))) return {};
   Order order;
   order.request = static_cast<Request>(m.request);
   order.id = {m.header.source, m.header.sequence};

@@ -109,6 +109,7 @@ class Laws {
   std::int64_t frozen_time_ = 0;                           // [ns]
   Vec6 frozen_low_ = Vec6::Zero(), frozen_high_ = Vec6::Zero();  // [m] from the anchor
   bool loops_open_ = false;  // one has been, since the last command that engaged
+  std::int64_t loop_opened_ = 0;  // [ns]
   std::optional<Vec6> alone_from_;
 };
 

@@ -90,8 +90,8 @@ std::vector<std::string> drawSettings(Dice& dice, const Scenario& scenario) {
                                       dice.between(0.9, 1.1)));
   if (scenario.arm) put("base.keep_modes", dice.chance(0.7) ? "6" : "12");
   // Short, so that a life has time for them.
-  put("legs.watchdog", fmt::format("{{park_after_s: {:.1f}, park_time_s: {:.1f}}}",
-                                   dice.between(0.6, 3.0), dice.between(5.0, 12.0)));
+  put("legs.watchdog.park_after_s", fmt::format("{:.1f}", dice.between(0.6, 3.0)));
+  put("legs.watchdog.park_time_s", fmt::format("{:.1f}", dice.between(5.0, 12.0)));
   put("seed", std::to_string(dice.whole(0, 1'000'000)));
   return set;
 }

@@ -108,19 +108,15 @@ class Shrinker {
   int tried_ = 0;
 };
 
-struct Ended {
-  Outcome outcome;
-  std::string refused;  // its configuration was
-};
-
-Ended one(const Life& life, const Options& options) {
-  Ended out;
+Outcome liveSeed(std::uint64_t seed, const Options& options) {
   try {
-    out.outcome = live(life, experimentOf(life, options.config), options);
+    const Life life = draw(seed, options.config);
+    return live(life, experimentOf(life, options.config), options);
   } catch (const InputError& error) {
-    out.refused = error.what();
+    Outcome out;  // every setting that is drawn is one that a person may choose
+    out.finding = Finding{"configuration", 0, error.what()};
+    return out;
   }
-  return out;
 }
 
 void tell(const Life& life, const Finding& finding, const std::string& file) {
@@ -135,28 +131,30 @@ int runSeeds(const Options& options) {
   const auto begin = Clock::now();
   const auto elapsed = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
   std::mutex mutex;
-  std::map<std::uint64_t, Ended> ended;  // by seed, until those before are counted
+  std::map<std::uint64_t, Outcome> ended;  // by seed, until those before are counted
   std::uint64_t next = options.first, counted = options.first, hash = 0;
   Outcome sum;
-  std::int64_t lives = 0, finds = 0, refused = 0;
+  std::int64_t lives = 0, finds = 0;
   bool over = false;
   double said = 0.0;
   // In the order of the seeds: what is printed does not depend on who was quicker.
   const auto count = [&] {
     for (auto at = ended.find(counted); at != ended.end() && !over; at = ended.find(counted)) {
-      const Outcome o = at->second.outcome;
-      const std::string why = at->second.refused;
+      const Outcome o = at->second;
       ended.erase(at);
       const std::uint64_t seed = counted++;
       ++lives;
-      refused += !why.empty();
       sum.seconds += o.seconds;
       sum.ticks += o.ticks;
       sum.stops += o.stops;
       sum.emulated += o.emulated;
       sum.compensated += o.compensated;
       hash = (hash ^ o.hash) * 0x100000001b3u;
-      if (o.finding) {
+      if (o.finding && o.finding->law == "configuration") {
+        ++finds;
+        over = !options.all;
+        fmt::print("seed {}: configuration: {}\n", seed, o.finding->what);
+      } else if (o.finding) {
         ++finds;
         Shrinker shrinker(options, draw(seed, options.config), *o.finding);
         const Life small = options.whole ? draw(seed, options.config) : shrinker.shrink();
@@ -184,12 +182,7 @@ int runSeeds(const Options& options) {
     while (!over) {
       const std::uint64_t seed = next++;
       lock.unlock();
-      Ended now;
-      try {
-        now = one(draw(seed, options.config), options);
-      } catch (const InputError& error) {
-        now.refused = error.what();
-      }
+      const Outcome now = liveSeed(seed, options);
       lock.lock();
       ended[seed] = now;
       count();
@@ -201,13 +194,13 @@ int runSeeds(const Options& options) {
   if (isatty(STDERR_FILENO)) fmt::print(stderr, "\n");
   fmt::print(
       "{} lives, {:.3f} machine-days, {:.2f} million ticks ({:.0f} % in admittance control, {:.0f} % "
-      "of that compensated), {} stops, {} refused by their configuration; {} broke a law; hash "
+      "of that compensated), {} stops; {} broke a law; hash "
       "{:016x}\n",
       lives, sum.seconds / 86400.0, 1e-6 * static_cast<double>(sum.ticks),
       100.0 * static_cast<double>(sum.emulated) / std::max(1.0, static_cast<double>(sum.ticks)),
       100.0 * static_cast<double>(sum.compensated) /
           std::max(1.0, static_cast<double>(sum.emulated)),
-      sum.stops, refused, finds, hash);
+      sum.stops, finds, hash);
   return finds == 0 ? 0 : 1;
 }
 

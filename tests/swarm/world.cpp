@@ -422,7 +422,7 @@ class World {
     intruder_.machine = machine_->id.source;
     intruder_.engaged = 1;
     intruder_.segment = -1;
-    for (std::size_t i = 0; i < 6; ++i) intruder_.counts[i] = machine_->sample.legs[i] + 40;
+    for (std::size_t i = 0; i < 6; ++i) intruder_.counts[i] = intruder_.rest[i] = machine_->sample.legs[i] + 40;
     if (ghost) laws_.ghost(kGhost);
   }
 

@@ -27,6 +27,7 @@ enum class Verb {
   kCollect,
   kStatus,
   kHold,
+  kStop,
   kReset,
   kCompensate,
   kUncompensate,

@@ -27,8 +27,9 @@ class AdmittanceControl {
  public:
   explicit AdmittanceControl(const ControllerConfig& config);
 
-  /// At rest at x; M_1 is the composite body that is compensated, `age` [s] that of the wrench.
-  void begin(const Vec6& x, const Mat6& M_1, double age) noexcept;
+  /// At rest at x; M_1 is the composite body that is compensated, `age` [s] that of the wrench,
+  /// `share` [-] of the compensation that is in.
+  void begin(const Vec6& x, const Mat6& M_1, double age, double share) noexcept;
 
   /// The coordinates one period on. `last` was commanded in the tick before. A wrench that is not
   /// finite leaves the model as it is: the finite check stops the run.

@@ -20,7 +20,8 @@ class JointReaction {
 
   /// Nothing is known of the past.
   void reset() noexcept { known_ = 0; }
-  /// A new sample. F_Po_P as its wrench shows it; zero until three samples have come.
+  /// A new sample. F_Po_P as its wrench shows it; zero until three angles have come. A driver of
+  /// the joints may be slower than the tick: then the last angles still hold.
   Wrench update(const KnownPayload& known, const Sample& sample) noexcept;
 
  private:
@@ -28,6 +29,8 @@ class JointReaction {
     std::int64_t time = 0;  // [ns]
     JointVector q = JointVector::Zero();
   };
+  /// Brought to `time` [ns]; zero while too little is known.
+  Wrench newest(std::int64_t time) const noexcept;
   static Vec6 reaction(const KnownPayload& known, const JointState& joints) noexcept;
 
   double window_, delay_;  // [s] of the sensor, ServoModel
@@ -35,6 +38,7 @@ class JointReaction {
   std::array<Angles, 3> last_{};  // the oldest first
   int known_ = 0;                 // [-] of them
   Vec6 input_ = Vec6::Zero();     // [N, N m] of the filter, at the middle one
+  Vec6 rate_ = Vec6::Zero();      // [N/s, N m/s] of it there
 };
 
 /// [1/s] The largest mean over so many samples, a period apart, of the acceleration that the wrench

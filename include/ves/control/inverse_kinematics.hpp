@@ -8,15 +8,15 @@
 
 namespace ves {
 
-/// What a tick would command.
+/// What a tick would command: a pose with its rates, and when it is meant.
 struct Proposal {
-  PathPoint<6> x;  // coordinates about home
+  Waypoint<6> x;  // coordinates about home
   Transform X_IP;
   LegMotion legs;
 };
 
 /// (C.11), (C.12), with rates (2.25) and accelerations (2.31).
-inline Proposal inverseKinematics(const Geometry& geometry, const PathPoint<6>& x) noexcept {
+inline Proposal inverseKinematics(const Geometry& geometry, const Waypoint<6>& x) noexcept {
   const BodyMotion P = bodyMotion(geometry, Pose::from(x.x), x.x_dot, x.x_ddot);
   return {x, P.X, legMotion(geometry, P)};
 }

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Leg communication (Appendix C): the one place where a command is made. What it sent last is what
-// the legs hold when a tick sends nothing.
+// Leg communication (Appendix C): the one place where a command is made. It sends lengths that were
+// checked, or holds the last ones that were: those, and not what the servos were told to get there,
+// which with the servos' lag taken out is ahead of them. Every command says where the legs rest
+// should it be the last.
 #pragma once
 
 #include <algorithm>
 
+#include "ves/control/checked.hpp"
 #include "ves/control/controller_config.hpp"
 #include "ves/control/servo_observer.hpp"
 
@@ -38,26 +41,28 @@ class LegCommander {
  public:
   explicit LegCommander(const ControllerConfig& config);
 
-  /// (C.13): counts of `legs`, which are meant `lead` [s] after this tick. `share` [-] of the
+  /// (C.13): counts of what was checked; where it does not pass, hold(). `share` [-] of the
   /// compensation takes out the servos' lag and, by the model `servo`, which is `age` [s] behind
-  /// this tick, the counts. A length that is not finite leaves the counts as they are.
-  void command(const LegMotion& legs, bool engaged, std::int32_t segment, double lead, double share,
-               const ServoObserver& servo, double age) noexcept;
-  /// The last lengths are held.
+  /// this tick, the counts.
+  void send(const Checked& next, std::int32_t segment, double share, const ServoObserver& servo,
+            double age) noexcept;
+  /// The last checked lengths are held.
   void hold() noexcept;
+  /// The legs are not commanded; they are at `legs`, or were last where these are not finite.
+  void release(const LegMotion& legs) noexcept;
   /// Whether the legs may go home should no further command come.
   void allowPark(bool park) noexcept { command_.park = park; }
 
   /// [m] where the legs should be in this tick: the last command's lengths or, with the servos' lag
-  /// taken out, those brought to now. `lead` [s] is what the last command was ahead of its tick.
-  Vec6 expected(double lead, double share) const noexcept;
+  /// taken out, those brought to now.
+  Vec6 expected(double share) const noexcept;
 
   const LegCommand& command() const noexcept { return command_; }
   const LegMotion& legs() const noexcept { return legs_; }       // last commanded
   const Vec6& reference() const noexcept { return reference_; }  // [m] what the servos were told
 
  private:
-  Vec6 referenceOf(const LegMotion& legs, double lead, double share, const ServoObserver& servo,
+  Vec6 referenceOf(const LegMotion& legs, double ahead, double share, const ServoObserver& servo,
                    double age) const noexcept;
 
   LegCodec codec_;
@@ -66,6 +71,7 @@ class LegCommander {
   double leg_min_, leg_max_;  // [m]
   LegCommand command_;
   LegMotion legs_;
+  double ahead_ = 0.0;  // [s] of the last command's lengths after its tick
   Vec6 reference_ = Vec6::Zero();
   Vec6 rounding_residual_ = Vec6::Zero();  // [m] of the commands so far
 };

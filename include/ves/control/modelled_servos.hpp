@@ -20,6 +20,9 @@ struct ServoGains {
 /// All times are [ns] of the machine's clock.
 class ModelledServos {
  public:
+  /// [-] periods that a command may be on its way: so many are remembered.
+  static constexpr int kMostDelay = 12;
+
   using Channels = Eigen::Array<double, kLegs, 1>;
 
   /// What passes in one length of time under a constant current.
@@ -76,7 +79,7 @@ class ModelledServos {
   Channels pass(const Passage& passage) noexcept;
   void update() noexcept;
 
-  static constexpr std::size_t kCommands = 16;
+  static constexpr std::size_t kCommands = kMostDelay + 4;
 
   ServoModel servo_;
   std::int64_t period_;   // [ns] of the controller

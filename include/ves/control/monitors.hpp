@@ -56,6 +56,9 @@ class FrozenSensor {
   double change_ = 0.0;  // [count] of the expected since then
 };
 
+/// [-] safety.overruns_per_second, at most.
+inline constexpr int kMostOverruns = 1000;
+
 /// Ticks that came late: woke late, or the one before ran long. Never made up for.
 class Overruns {
  public:
@@ -64,7 +67,7 @@ class Overruns {
   bool good(const SafetyLimits& limits, std::int64_t ticks_per_second) const noexcept;
 
  private:
-  static constexpr std::size_t kKept = 64;  // [-] more than any limit
+  static constexpr std::size_t kKept = kMostOverruns + 1;
   std::array<std::int64_t, kKept> late_{};  // ticks, a ring
   std::size_t count_ = 0;                   // [-] so far
   std::int64_t missed_ = 0;                 // [-] before the last tick

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // What the platform should do next: the admittance model, or trajectory generation along a plan.
+//
+// The admittance model says where to be in the next tick, trajectory generation where to be in this
+// one (Appendix C). A plan that begins in motion goes on from where and when that was meant, until
+// it rests: so no instant of the path is left out, or said twice.
 #pragma once
 
 #include "ves/control/admittance_control.hpp"
@@ -13,21 +17,21 @@ class MotionGenerator {
   explicit MotionGenerator(const ControllerConfig& config)
       : settings_{config.periodSeconds(), config.gentle}, path_(config.path), admittance_(config) {}
 
-  /// Begins a segment at `tick` from what was last commanded; admittance control with the composite
-  /// body M_1 and a wrench `age` [s] old.
-  void begin(const Segment& segment, std::int64_t tick, const Mat6& M_1, double age) noexcept;
+  /// Begins a segment at `tick` from what was last commanded; the rest is AdmittanceControl's.
+  void begin(const Segment& segment, std::int64_t tick, const Mat6& M_1, double age,
+             double share) noexcept;
   /// Begins to brake, and then to stay.
   void brake(const Braking& braking) noexcept;
   /// Begins a gentle move to the home pose.
   void goHome() noexcept;
 
   /// (C.2) to (C.7): the next state of the base.
-  PathPoint<6> admittanceModel(const AdmittanceInput& in, const PathChecks& checks) noexcept;
-  /// (C.8) to (C.10), moves and recorded paths: where to be in this tick.
-  PathPoint<6> trajectoryGeneration() noexcept;
+  Waypoint<6> admittanceModel(const AdmittanceInput& in, const PathChecks& checks) noexcept;
+  /// (C.8) to (C.10), moves and recorded paths.
+  Waypoint<6> trajectoryGeneration() noexcept;
 
-  /// What was commanded in this tick: `next_state` if it is meant for the next one.
-  void commit(const PathPoint<6>& x, bool next_state) noexcept;
+  /// What was commanded in this tick.
+  void commit(const Waypoint<6>& x) noexcept;
   /// The last commanded pose is held from now on.
   void hold() noexcept;
 
@@ -38,7 +42,7 @@ class MotionGenerator {
   /// Ticks after `tick` in which a monitor segment takes no sample.
   std::int64_t idleTicks(std::int64_t tick) const noexcept;
 
-  const PathPoint<6>& motion() const noexcept { return motion_; }  // last commanded
+  const Waypoint<6>& motion() const noexcept { return motion_; }  // last commanded
   const Vec6& desired() const noexcept { return desired_; }        // at this very tick
   const AdmittanceControl& admittance() const noexcept { return admittance_; }
   MotionPlan planned(const Segment& segment) const noexcept {
@@ -47,14 +51,17 @@ class MotionGenerator {
   const RecordedPath& path() const noexcept { return path_; }
 
  private:
+  void follow(const MotionPlan& plan) noexcept;
+
   PlanSettings settings_;
   RecordedPath path_;
   AdmittanceControl admittance_;
   Segment segment_;
   MotionPlan plan_;
+  double ahead_ = 0.0;           // [s] of the plan's points
   std::int64_t n_ = 0;           // [-] periods of the plan so far
   std::int64_t start_tick_ = 0;  // [-] of the segment
-  PathPoint<6> motion_;
+  Waypoint<6> motion_;
   Vec6 desired_ = Vec6::Zero();
 };
 

@@ -71,7 +71,8 @@ class Rehearsal {
 
  private:
   MotionPlan plan_;
-  std::int64_t n_ = 0;  // [-] periods of the plan so far
+  std::int64_t n_ = 0;     // [-] periods of the plan so far
+  std::int64_t last_ = 0;  // [-] of the pose before
   Vec6 L_last_ = Vec6::Zero();
   Check failure_ = Check::kCount;
   bool under_way_ = false;

@@ -17,6 +17,9 @@ class PortWork {
  public:
   explicit PortWork(const ControllerConfig& config) noexcept;
 
+  /// Nothing is known of the past.
+  void reset() noexcept { known_ = 0; }
+
   struct Work {
     /// [J] since the reading before, by a parabola through the last three. Its second derivative
     /// lags by half a period: in a contact of a few periods that is rather too little work on a

@@ -65,6 +65,7 @@ enum class Request : std::int32_t {
   kReset,         // out of a stop, back to disarmed
   kCompensate,    // what the configuration has of compensation comes in
   kUncompensate,  // and goes out again: as published
+  kOvertaken,     // an order that a hold or a stop came before: it is answered, and not obeyed
   kCount
 };
 
@@ -84,6 +85,7 @@ enum class Refusal : std::int32_t {
   kNoCompensation,  // the configuration has none
   kUnassessed,      // the stability of this loop was not checked
   kChecking,        // not refused yet: its path is being checked, over some ticks
+  kOvertaken,       // a hold, a stop or a failing check came before it began
   kCount
 };
 

@@ -85,6 +85,7 @@ class RobotInertia {
   double scale_;     // [-] of it that the wrench shows
   Geometry geometry_;
   RigidBody composite_P_;
+  bool known_ = false;  // composite_P_, since the legs were engaged
   Mat6 M_1_ = Mat6::Zero();
 };
 

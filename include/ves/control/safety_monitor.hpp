@@ -3,7 +3,7 @@
 // All safety checks of a tick, collected into one set.
 #pragma once
 
-#include "ves/control/inverse_kinematics.hpp"
+#include "ves/control/checked.hpp"
 #include "ves/control/leg_estimator.hpp"
 #include "ves/control/path_checks.hpp"
 
@@ -27,7 +27,7 @@ class SafetyMonitor {
 
   /// Every check of Appendix C and beyond, of what would be commanded. `conflict`: another node
   /// was heard on the bus.
-  Tripped check(const Proposal& proposal, const LegContext& context, const SampleStream& samples,
+  Checked check(const Proposal& proposal, const LegContext& context, const SampleStream& samples,
                 const LegEstimator& legs, const Wrench& dynamic, const Oscillation& oscillation,
                 bool conflict) const noexcept;
 

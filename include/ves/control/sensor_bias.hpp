@@ -16,7 +16,8 @@ class Tare {
   Tare(double ramp, double period, double limit) : ramp_(ramp), period_(period), limit_(limit) {}
 
   void begin() noexcept;
-  void cancel() noexcept { state_ = State::kNone; }
+  /// `bias` is what it was before.
+  void cancel(Vec6& bias) noexcept;
   bool running() const noexcept { return state_ != State::kNone; }
 
   /// A tick: `static_counts` [count] is what the static load alone would read. Changes `bias`.
@@ -30,6 +31,7 @@ class Tare {
   double limit_;   // [count] of a bias; more is a load, or a fault
   State state_ = State::kNone;
   ChannelStatistics statistics_;
+  Vec6 before_ = Vec6::Zero();  // [count] the bias
   Quintic<6> path_;     // [count]
   std::int64_t n_ = 0;  // [-] ticks since the ramp began
 };
@@ -42,7 +44,7 @@ class SensorBias {
         bias_(config.bias) {}
 
   void beginTare() noexcept { tare_.begin(); }
-  void cancelTare() noexcept { tare_.cancel(); }
+  void cancelTare() noexcept { tare_.cancel(bias_); }
   bool taring() const noexcept { return tare_.running(); }
   void stepTare(const Sample& sample, bool fresh, const Vec6& static_counts) noexcept {
     tare_.step(sample, fresh, static_counts, bias_);

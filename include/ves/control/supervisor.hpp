@@ -4,6 +4,7 @@
 // state diagram is in control/test_platform.hpp.
 #pragma once
 
+#include "ves/control/answers.hpp"
 #include "ves/control/leg_commander.hpp"
 #include "ves/control/motion_generator.hpp"
 #include "ves/control/sensor_bias.hpp"
@@ -60,14 +61,16 @@ class Supervisor {
   }
   std::int32_t segment() const noexcept { return segment_; }
 
-  /// Everything of the report that is decided here.
-  void report(TickState& state) const noexcept;
+  /// The end of a tick: everything of the report that is decided here.
+  void report(TickState& state) noexcept;
 
  private:
   Refusal obey(const Order& order, const Situation& now, Actuation act) noexcept;
   Refusal arm(Request request, const Situation& now, Actuation act) noexcept;
   Refusal run(const Segment& segment, const Situation& now, Actuation act) noexcept;
   void rehearse(const Situation& now, Actuation act) noexcept;
+  void forgetRehearsal() noexcept;
+  void abort(Refusal why, const Situation& now, Actuation act) noexcept;
   Refusal compensate(bool in, const Situation& now, Actuation act) noexcept;
   Refusal reset(Actuation act) noexcept;
   Refusal refusesAdmittance(const Situation& now, Actuation act) const noexcept;
@@ -85,9 +88,8 @@ class Supervisor {
   Request pending_request_ = Request::kNone;  // kStart or kArm, once the stream is fresh
   bool operator_present_ = false;             // somebody gives orders: hold after what is over
   bool aborted_ = false;                      // the program: a calibration or a start was refused
-  OrderId order_;                             // the last one given, or answered
-  Refusal refusal_ = Refusal::kNone;          // of it
-  Check refused_by_ = Check::kCount;          // of a path that was refused
+  Refusal aborted_by_ = Refusal::kNone;       // why, of a start
+  Answers answers_;
   Order rehearsed_;                           // the order whose path is being checked
   Rehearsal rehearsal_;
   Tripped tripped_;               // in the last tick

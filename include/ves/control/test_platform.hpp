@@ -19,7 +19,7 @@
 // begins at the measured pose again.
 //
 // The invariant: every command that leaves is either the checked new lengths or the last checked
-// ones.
+// ones, with the instant for which they are meant. docs/safety.md has all laws.
 #pragma once
 
 #include "ves/control/aided_wrench.hpp"
@@ -43,11 +43,9 @@ class TestPlatform {
     Wrench inertial;       // of the robot's composite body, when that is compensated
     Wrench dynamic;        // total - static_wrench + inertial, less what passes for noise
   };
-  PathPoint<6> nextMotion(const Wrench& dynamic) noexcept;
-  Tripped safetyChecks(const Proposal& next, const Wrench& dynamic, bool conflict) const noexcept;
-  void legCommunication(const Proposal& next) noexcept;
-  void hold() noexcept;
-  double lead() const noexcept;
+  Waypoint<6> nextMotion(const Wrench& dynamic) noexcept;
+  Checked safetyChecks(const Proposal& next, const Wrench& dynamic, bool conflict) const noexcept;
+  void legCommunication(const Checked& next) noexcept;
   const TickState& report(const Wrenches& W) noexcept;
 
   ControllerConfig config_;

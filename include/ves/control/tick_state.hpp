@@ -43,9 +43,9 @@ struct TickState {
   Phase phase = Phase::kDisarmed;
   std::int32_t segment = -1;               // [-] of the program, -1 outside it
   SegmentKind kind = SegmentKind::kCount;  // of what runs; kCount: nothing
-  OrderId order;                           // the last one given
+  OrderId order;                           // the last one that was answered
+  Refusal refusal = Refusal::kNone;        // the answer
   Check refused_by = Check::kCount;        // of a path that was refused
-  Refusal refusal = Refusal::kNone;        // of it
   std::int64_t idle = 0;                   // [-] ticks to come of which nothing is expected
   std::int32_t age = 0;                    // [-] ticks since the sample was new
   Wrench total;                            // F_Po_I measured
@@ -70,6 +70,7 @@ struct TickState {
   Vec6 deviation = Vec6::Zero();                                 // [count] of a channel's samples
   Vec6 standard_error = Vec6::Zero();                            // [count] of the bias
   bool aborted = false;            // the program: a calibration or a start was refused
+  Refusal aborted_by = Refusal::kNone;  // why the start was
   double envelope_scale = 1.0;     // [-] of the admittance model's step that was taken
   double energy_put_in = 0.0;      // [J] by the emulation, since admittance control began
   double energy_paid = 0.0;        // [J] by the model's modes, to the passivity controller

@@ -15,6 +15,12 @@ struct PathPoint {
   Eigen::Matrix<double, N, 1> x_ddot = Eigen::Matrix<double, N, 1>::Zero();
 };
 
+/// Where to be, and when: `ahead` [s] after the tick that says so.
+template <int N>
+struct Waypoint : PathPoint<N> {
+  double ahead = 0.0;
+};
+
 /// The fifth-order polynomial (report, chapter 3) from any state to any other; behind its end it
 /// stays there.
 template <int N>

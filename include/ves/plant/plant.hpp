@@ -25,6 +25,7 @@
 #include "ves/plant/faults.hpp"
 #include "ves/plant/force_torque_sensor.hpp"
 #include "ves/plant/leg_slave.hpp"
+#include "ves/plant/leg_watchdog.hpp"
 #include "ves/robot/newton_euler.hpp"
 #include "ves/robot/payload.hpp"
 
@@ -43,14 +44,6 @@ struct RobotEvent {
 
 /// Between two looks at what touches; half of it changes no figure of a contact by 1 %.
 inline constexpr double kContactStep = 50e-6;  // [s]
-
-/// What the LegSlaves do when nobody commands them: they keep their last reference, and after a
-/// while go slowly home, unless the last command told them to stay or a safety loop has been opened
-/// since. Each by itself: every board knows its own length at home, and all take the same time.
-struct Watchdog {
-  std::int64_t park_after = 10'000'000'000;  // [ns] of silence
-  std::int64_t park_time = 20'000'000'000;   // [ns]
-};
 
 /// Temperature of the laboratory: mean + swing/2 sin(2 pi (t - rising)/period).
 struct Climate {
@@ -138,7 +131,6 @@ class Plant {
   bool still() const noexcept;
   void skip(std::int64_t until) noexcept;
   void moveActuators(std::int64_t to) noexcept;
-  void watch() noexcept;
   bool now(const Cue& cue, std::int64_t duration) const noexcept;
   double current(std::size_t leg) const noexcept;
   void readTransducers() noexcept;
@@ -157,7 +149,7 @@ class Plant {
   Transform X_SL0_;
   std::vector<LegSlave> slaves_;
   std::vector<Actuator> actuators_;
-  LegCounts reference_{};
+  LegWatchdog watchdog_;
   ForceTorqueSensor sensor_;
   Butterworth2<kLegs> filter_position_;
   Butterworth3<kLegs> filter_velocity_, filter_acceleration_;
@@ -174,14 +166,13 @@ class Plant {
   std::vector<AdcCounts> sensor_readings_;         // a ring, a reading longer than the window
   std::size_t read_ = 0;                           // [-] readings so far
   std::int64_t sequence_ = -1;
-  std::int64_t segment_ = -1;                           // of the last command
+  std::int64_t segment_ = -1;                           // of the program, as last commanded
+  bool outside_ = true;                                 // of it, by the last command
   std::int64_t segment_start_ = 0;                      // [ns]
   std::array<std::int64_t, kMaxSegments + 1> began_{};  // [ns] each segment; kNever: not yet
   std::int64_t next_robot_event_ = kNever;              // [ns]
-  std::int64_t heard_ = kNever;  // [ns] the last command to follow; kNever: none yet
-  bool may_park_ = false;
-  LegCounts home_{}, parked_from_{};
-  std::vector<Injector> injectors_;  // one a fault
+  std::vector<Injector> injectors_;      // one a fault
+  std::vector<FaultEvent> valve_faults_;  // those that are not of samples
   std::vector<bool> robot_event_done_;
   int refused_events_ = 0;
   MovingRobot robot_;  // all rigid plates counted into its base

@@ -150,6 +150,22 @@ struct Rejections {
   std::string text() const;
 };
 
+/// Whose samples a controller takes: of one machine, and of a newer one while nothing is engaged.
+class MachineHeard {
+ public:
+  enum class Verdict { kSame, kRenewed, kAnother };
+  /// `alive`: it is no recording (on a bus with a key: it names a command of this controller).
+  Verdict judge(const header_t& from, bool alive, bool engaged) const noexcept {
+    if (from.source == machine_.source && from.epoch == machine_.epoch) return Verdict::kSame;
+    return !engaged && alive && from.epoch > machine_.epoch ? Verdict::kRenewed : Verdict::kAnother;
+  }
+  void take(const header_t& from) noexcept { machine_ = {from.source, from.epoch}; }
+  std::int64_t source() const noexcept { return machine_.source; }  // [-] 0: none yet
+
+ private:
+  Identity machine_;
+};
+
 /// The controller's side: the newest sample, the operator's orders, whether somebody else is there.
 ///
 /// On a bus with a key a machine is taken only when its sample names a command of this controller:
@@ -164,13 +180,13 @@ class ControllerLink {
   std::int64_t answers() const noexcept { return answers_; }  // lockstep: tick the sample answers
   std::int64_t sampleTime() const noexcept { return sample_time_; }  // [ns] sender's clock
   /// The oldest order that waits; none when none does. An order that is repeated, because its
-  /// sender saw no answer, counts once; a stop goes before what waits.
+  /// sender saw no answer, counts once; a hold and a stop go before what waits, which is overtaken.
   Order takeOrder() noexcept;
   bool takeConflict() noexcept { return std::exchange(conflict_, false); }
   std::int64_t rejected() const noexcept { return rejected_; }  // [-] messages not let in
   const Rejections& samplesRejected() const noexcept { return samples_rejected_; }
   /// [-] header.source of the machine that samples come from; 0 before the first.
-  std::int64_t machine() const noexcept { return plant_.source; }
+  std::int64_t machine() const noexcept { return machine_.source(); }
   /// Of the machine's clock, from commands and the samples that name them.
   const ClockOffset& clock() const noexcept { return clock_; }
 
@@ -183,7 +199,7 @@ class ControllerLink {
   Sample sample_;
   std::int64_t answers_ = -2;
   std::int64_t sample_time_ = 0;
-  Identity plant_;
+  MachineHeard machine_;
   bool engaged_ = false;
   void receiveSample(const void* data, std::uint32_t size) noexcept;
   void receiveOrder(const operator_t& message) noexcept;
@@ -195,10 +211,10 @@ class ControllerLink {
   std::array<Sent, 64> sent_{};  // the last commands, by sequence
   ClockOffset clock_;
 
-  static constexpr std::size_t kOrders = 16;
-  std::array<Order, kOrders> orders_{};  // that wait, oldest first
+  static constexpr std::size_t kOrders = 16;  // [-] that wait; of holds and stops so many more
+  std::array<Order, 2 * kOrders> orders_{};   // oldest first
   std::size_t waiting_ = 0;
-  std::array<OrderId, kOrders> known_{};  // taken before, in a ring
+  std::array<OrderId, 4 * kOrders> known_{};  // taken before, in a ring
   std::size_t next_known_ = 0;
   bool conflict_ = false;
   std::int64_t rejected_ = 0;

@@ -25,6 +25,8 @@ void forEachField(const state_t& m, F f) {
   f("machine_time_ns", m.machine_time_ns);
   f("sample_sequence", m.sample_sequence);
   f("request", m.request);
+  f("request_source", m.request_source);
+  f("request_sequence", m.request_sequence);
   f("order_source", m.order_source);
   f("order_sequence", m.order_sequence);
   f("refusal", m.refusal);
@@ -67,6 +69,7 @@ void forEachField(const state_t& m, F f) {
   f("cause", m.cause);
   f("cause_tick", m.cause_tick);
   f("aborted", m.aborted);
+  f("aborted_by", m.aborted_by);
   f("envelope_scale", m.envelope_scale);
   f("energy_put_in", m.energy_put_in);
   f("energy_paid", m.energy_paid);
@@ -75,6 +78,8 @@ void forEachField(const state_t& m, F f) {
   f("engaged", m.engaged);
   f("park", m.park);
   f("counts", m.counts);
+  f("rest", m.rest);
+  f("ahead_ns", m.ahead_ns);
 }
 
 template <typename F>
@@ -84,6 +89,8 @@ void forEachField(const leg_command_t& m, F f) {
   f("segment", m.segment);
   f("park", m.park);
   f("counts", m.counts);
+  f("rest", m.rest);
+  f("ahead_ns", m.ahead_ns);
 }
 
 inline constexpr std::size_t kFingerprintSize = 8;  // [B] of every encoded message
