@@ -547,7 +547,7 @@ TEST_F(Emulation, StuckValveStopsIt) {
   EXPECT_EQ(result.cause, Check::kPositionError);
 }
 
-TEST_F(Emulation, StopEndsWhereTheLegsWereTold) {  // a freeze in the middle of a fast motion
+TEST_F(Emulation, StopEndsAtTheLastCheckedLengths) {  // a freeze in the middle of a fast motion
   const Experiment e = experiment(
       "z_sine", kCompensated,
       {"program=[{trajectory: {duration_s: 3, z: {sine: {amplitude_m: 0.2, frequency_hz: 0.5}}}, "
@@ -557,7 +557,7 @@ TEST_F(Emulation, StopEndsWhereTheLegsWereTold) {  // a freeze in the middle of 
   const Row& last = series.rows.back();
   EXPECT_EQ(last.state.latched, 1 << static_cast<int>(Check::kPanicButton));
   for (int i = 0; i < 6; ++i)
-    EXPECT_NEAR(last.truth.leg[i], last.state.reference[i], 2.0 * e.plant.transducer.scale);
+    EXPECT_NEAR(last.truth.leg[i], last.state.leg[i], 2.0 * e.plant.transducer.scale);
 }
 
 // Identification of the servo

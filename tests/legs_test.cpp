@@ -177,6 +177,7 @@ class Silence : public testing::Test {
     c.counts =
         legCounts(e_.controller.legs,
                   legLengths(e_.plant.geometry, e_.plant.geometry.fromHome(e_.plant.initial_pose)));
+    c.rest = c.counts;
     command_ = c;
   }
   double away() {
@@ -236,7 +237,7 @@ TEST_F(Silence, ACommandTakesTheLegsBackWithoutAStep) {
   wait(20);
   const Sample s = plant_.sample();
   EXPECT_TRUE(plant_.truth().parking);
-  command_.counts = s.legs;
+  command_.counts = command_.rest = s.legs;
   plant_.command(command_);
   const double then = away();
   wait(1);

@@ -130,10 +130,12 @@ TEST(Plant, IgnoresCommandsThatAreNotEngaged) {
   LegCommand command;
   command.counts = before;
   for (auto& c : command.counts) c += 500;
+  command.rest = command.counts;
   plant.command(command);
   plant.advance(1'000'000'000);
   EXPECT_EQ(plant.sample().legs, before);
   command.engaged = true;
+  command.rest = command.counts;
   plant.command(command);
   plant.advance(3'000'000'000);
   const LegCounts after = plant.sample().legs;
@@ -149,6 +151,7 @@ TEST(Plant, TrueRatesAreTheDerivativesOfTheTruePose) {
   command.engaged = true;
   command.counts = plant.sample().legs;
   for (std::size_t i = 0; i < kLegs; ++i) command.counts[i] += static_cast<int>(60 + 30 * i);
+  command.rest = command.counts;
   plant.command(command);
   const double dt = 50e-6;
   Truth before = plant.truth();
@@ -181,6 +184,7 @@ TEST(Plant, PlatesCountedIntoTheRobotsBaseWeighTheSame) {
     const double s = 0.03 * std::sin(0.1 * k);
     command.counts =
         legCounts(e.controller.legs, legLengths(g, g.fromHome({{s, 0.0, s}, {s, -s, 0.0}})));
+    command.rest = command.counts;
     plant.command(command);
     plant.advance((k + 1) * 10'000'000LL);
     plant.sample();
@@ -212,6 +216,7 @@ TEST(Plant, FiltersDelayTheOutputsOnly) {
       const Geometry& g = e.controller.geometry;
       command.counts = legCounts(e.controller.legs,
                                  legLengths(g, g.fromHome({{0.0, 0.0, 0.001 * k}, Vec3::Zero()})));
+      command.rest = command.counts;
       plant.command(command);
       plant.advance((k + 1) * 10'000'000LL);
     }
@@ -272,6 +277,7 @@ TEST(Plant, CuesCountFromTheSegmentsFirstCommand) {
   command.counts = plant.sample().legs;
   for (int k = 0; k < 400; ++k) {
     command.segment = k < 100 ? 1 : 2;  // segment 2 begins at 1 s
+    command.rest = command.counts;
     plant.command(command);
     plant.advance((k + 1) * 10'000'000LL);
     const Sample s = plant.sample();
@@ -290,9 +296,11 @@ TEST(Plant, ALongLeapIsAsGoodAsManySteps) {  // what is still is passed over; wh
     command.counts = plant.sample().legs;
     command.engaged = true;
     command.counts[0] -= 6000;  // longer under way than the second that a leap leaves
+    command.rest = command.counts;
     plant.command(command);
     const std::int64_t end = 20'000'000'000;
     for (std::int64_t t = plant.time(); t < end; t += step) {
+      command.rest = command.counts;
       plant.command(command);
       plant.advance(std::min(end, t + step));
     }
@@ -365,7 +373,9 @@ TEST(Plant, SamplingMoreOftenChangesNothingButTheSensorsSteps) {
   command.counts = often.sample().legs;
   seldom.sample();
   for (auto& c : command.counts) c += 300;
+  command.rest = command.counts;
   often.command(command);
+  command.rest = command.counts;
   seldom.command(command);
   for (int k = 1; k <= 1000; ++k) {
     often.advance(k * 777'777LL);

@@ -218,7 +218,7 @@ TEST(PathChecks, NoLegLiesDownOnAPlate) {
 
 TEST(SafetyMonitor, NothingThatIsNotFinitePasses) {
   const ControllerConfig c = experiment("puma_on_table_4_1").controller;
-  const Proposal good = inverseKinematics(c.geometry, atRest(Vec6::Zero()));
+  const Proposal good = inverseKinematics(c.geometry, {atRest(Vec6::Zero())});
   const auto finite = [&](const Proposal& p, const Sample& sample, const Wrench& dynamic) {
     SampleStream samples(c.period);
     samples.update(sample, 0, false, false);
@@ -226,6 +226,7 @@ TEST(SafetyMonitor, NothingThatIsNotFinitePasses) {
     return !monitor
                 .check(p, {good.legs.L, good.legs.L}, samples, LegEstimator(c), dynamic,
                        Oscillation(), false)
+                .tripped()
                 .has(Check::kFinite);
   };
   Sample sample;

@@ -28,7 +28,7 @@ struct Desk {
   }
   TickState advance() {
     supervisor.advance(now(), act());
-    if (supervisor.moves()) motion.commit(motion.trajectoryGeneration(), false);
+    if (supervisor.moves()) motion.commit(motion.trajectoryGeneration());
     supervisor.trip(tripped, now(), act());
     ++tick;
     TickState state;
@@ -148,8 +148,14 @@ TEST(Supervisor, APathIsCheckedOverSomeTicksBeforeItBegins) {
 
   for (const Request request : {Request::kHold, Request::kStop}) {
     Desk dropped(puma());
-    asked(dropped);
-    dropped.order(request);
+    const std::int64_t path = asked(dropped), at = dropped.tick;
+    // Both are answered, one in a tick.
+    const TickState first = dropped.order(request);
+    EXPECT_EQ(first.order.sequence, path);
+    EXPECT_EQ(first.refusal, Refusal::kOvertaken);
+    const TickState second = dropped.advance();
+    EXPECT_EQ(second.order.sequence, at);
+    EXPECT_EQ(second.refusal, Refusal::kNone);
     for (int n = 0; n < 20; ++n) EXPECT_NE(dropped.advance().phase, Phase::kRunning);
   }
 
@@ -158,7 +164,7 @@ TEST(Supervisor, APathIsCheckedOverSomeTicksBeforeItBegins) {
   tripped.tripped = only(Check::kStale);
   const TickState after = tripped.advance();
   EXPECT_EQ(after.order.sequence, lost);
-  EXPECT_EQ(after.refusal, Refusal::kNotArmed);
+  EXPECT_EQ(after.refusal, Refusal::kOvertaken);
   for (int n = 0; n < 20; ++n) EXPECT_NE(tripped.advance().phase, Phase::kRunning);
 }
 

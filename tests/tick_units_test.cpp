@@ -414,62 +414,112 @@ TEST(Rehearsal, NamesTheCheckThatAStepByStepWalkMeetsSomePosesATick) {
 
 // Commands
 
-TEST(LegCommander, SendsTheCheckedLengthsToTheNearestCount) {
-  const ControllerConfig& c = puma();
-  LegCommander commander(c);
-  const ServoObserver servo(c.servo, c.periodSeconds());
-  LegMotion legs;
-  legs.L = Vec6::LinSpaced(1.3, 1.7);
-  legs.L_dot = Vec6::Constant(0.1);
-  commander.command(legs, true, 3, 0.0, 0.0, servo, 0.0);
-  const Vec6 sent = legLengths(c.legs, commander.command().counts);
-  EXPECT_LE((sent - legs.L).cwiseAbs().maxCoeff(), 0.5 * c.legs.scale(0) * (1.0 + 1e-9));
-  EXPECT_TRUE(commander.command().engaged);
-  EXPECT_EQ(commander.command().segment, 3);
-  EXPECT_EQ(commander.expected(0.0, 1.0), legs.L);  // as published: no lag is taken out
+/// `legs` as a SafetyMonitor passes them, or refuses them where they cannot be.
+Checked checked(const ControllerConfig& c, const LegMotion& legs, double ahead = 0.0) {
+  Proposal p = inverseKinematics(c.geometry, {atRest(Vec6::Zero()), ahead});
+  p.legs = legs;
+  Sample s = numbered(0);
+  s.switches = kAllSwitchesClosed;
+  s.adc[kWrenchChannels] = (c.safety.pressure_min + c.safety.pressure_max) / 2;
+  s.legs = legCounts(c.legs, legLengths(c.geometry, c.geometry.fromHome({})));
+  SampleStream samples(c.period);
+  samples.update(s, 0, false, false);
+  LegEstimator estimator(c);
+  const Vec6& measured = estimator.update(samples, {}, false, LegCommander(c)).L;
+  return SafetyMonitor(c.safety, c.geometry, c.periodSeconds())
+      .check(p, {legs.L, measured}, samples, estimator, {}, Oscillation(), false);
+}
 
-  const LegCounts before = commander.command().counts;
-  legs.L(2) = kNan;
-  commander.command(legs, true, 3, 0.0, 0.0, servo, 0.0);
-  EXPECT_EQ(commander.command().counts, before);
-  commander.hold();
-  EXPECT_EQ(commander.legs().L_dot.norm(), 0.0);
+struct Sender {
+  explicit Sender(const ControllerConfig& config) : c(config), commander(config) {}
+  void send(const LegMotion& legs, double ahead = 0.0, double share = 1.0) {
+    commander.send(checked(c, legs, ahead), 3, share, servo, 0.0);
+  }
+  ControllerConfig c;
+  LegCommander commander;
+  ServoObserver servo{c.servo, c.periodSeconds()};
+};
+
+LegMotion moving(double L, double L_dot) {
+  return {Vec6::Constant(L), Vec6::Constant(L_dot), Vec6::Zero()};
+}
+
+TEST(LegCommander, SendsTheCheckedLengthsToTheNearestCount) {
+  Sender to(puma());
+  LegMotion legs = moving(1.5, 0.1);
+  legs.L = Vec6::LinSpaced(1.3, 1.7);
+  to.send(legs, to.c.periodSeconds(), 0.0);
+  const LegCommand& command = to.commander.command();
+  const Vec6 sent = legLengths(to.c.legs, command.counts);
+  EXPECT_LE((sent - legs.L).cwiseAbs().maxCoeff(), 0.5 * to.c.legs.scale(0) * (1.0 + 1e-9));
+  EXPECT_TRUE(command.engaged);
+  EXPECT_EQ(command.segment, 3);
+  EXPECT_EQ(command.rest, command.counts);
+  EXPECT_EQ(command.ahead, to.c.period);
+  EXPECT_EQ(to.commander.expected(1.0), legs.L);  // as published: no lag is taken out
+}
+
+TEST(LegCommander, WhatDoesNotPassIsNotSentTheLastCheckedLengthsAreHeld) {
+  Sender to(puma());
+  to.send(moving(1.5, 0.1));
+  const LegCounts before = to.commander.command().counts;
+  for (const double bad : {kNan, 2.0, 1.0}) {  // [m] no length, too long, too short
+    LegMotion legs = moving(1.5, 0.1);
+    legs.L(2) = bad;
+    to.send(legs);
+    EXPECT_EQ(to.commander.command().counts, before) << bad;
+    EXPECT_EQ(to.commander.command().rest, before) << bad;
+    EXPECT_EQ(to.commander.legs().L, Vec6::Constant(1.5)) << bad;
+    EXPECT_EQ(to.commander.legs().L_dot.norm(), 0.0) << bad;
+  }
+}
+
+TEST(LegCommander, HoldsTheCheckedLengthsAndNotWhatLedToThem) {
+  for (const double ahead : {0.0, puma().periodSeconds()}) {
+    ControllerConfig c = puma();
+    c.compensation.feed_forward = c.compensation.observer = true;
+    Sender to(c);
+    to.servo.reset(Vec6::Constant(1.5), 0);
+    to.send(moving(1.5, 0.4), ahead);
+    const LegCounts rest = legCounts(c.legs, Vec6::Constant(1.5));
+    EXPECT_EQ(to.commander.command().rest, rest);
+    EXPECT_GT(to.commander.command().counts[0], rest[0] + 100);  // by 0.4 m/s of lag
+    to.commander.hold();
+    EXPECT_EQ(to.commander.command().counts, rest);
+    EXPECT_EQ(to.commander.command().ahead, 0);
+    EXPECT_EQ(to.commander.reference(), Vec6::Constant(1.5));
+    EXPECT_EQ(to.commander.expected(1.0), Vec6::Constant(1.5));
+  }
 }
 
 TEST(LegCommander, WithTheLagTakenOutExpectsTheCommandBroughtToNowAndStaysInsideTheLimits) {
   ControllerConfig c = puma();
   c.compensation.feed_forward = true;
-  LegCommander commander(c);
-  const ServoObserver servo(c.servo, c.periodSeconds());
-  LegMotion legs;
-  legs.L = Vec6::Constant(1.5);
-  legs.L_dot = Vec6::Constant(0.1);
-  commander.command(legs, true, 0, 0.0, 1.0, servo, 0.0);
-  EXPECT_GT(commander.reference()(0), 1.5 + 0.1 / c.servo.extend(0));  // ahead by the lag at least
-  EXPECT_NEAR(commander.expected(0.0, 1.0)(0), 1.5 + 0.1 * c.periodSeconds(), 1e-12);
-  EXPECT_NEAR(commander.expected(c.periodSeconds(), 1.0)(0), 1.5, 1e-12);
-  legs.L = Vec6::Constant(c.safety.leg_max - 1e-4);
-  commander.command(legs, true, 0, 0.0, 1.0, servo, 0.0);
-  EXPECT_EQ(commander.reference(), Vec6::Constant(c.safety.leg_max));
-  legs.L = Vec6::Constant(c.safety.leg_min + 1e-4);
-  legs.L_dot = Vec6::Constant(-0.1);
-  commander.command(legs, true, 0, 0.0, 1.0, servo, 0.0);
-  EXPECT_EQ(commander.reference(), Vec6::Constant(c.safety.leg_min));
+  const double T = c.periodSeconds();
+  Sender to(c);
+  to.send(moving(1.5, 0.1));
+  EXPECT_GT(to.commander.reference()(0), 1.5 + 0.1 / c.servo.extend(0));  // by the lag at least
+  EXPECT_NEAR(to.commander.expected(1.0)(0), 1.5 + 0.1 * T, 1e-12);
+  to.send(moving(1.5, 0.1), T);  // meant for the next tick, which then is now
+  EXPECT_NEAR(to.commander.expected(1.0)(0), 1.5, 1e-12);
+  to.send(moving(c.safety.leg_max - 1e-4, 0.1));
+  EXPECT_EQ(to.commander.reference(), Vec6::Constant(c.safety.leg_max));
+  to.send(moving(c.safety.leg_min + 1e-4, -0.1));
+  EXPECT_EQ(to.commander.reference(), Vec6::Constant(c.safety.leg_min));
 }
 
 TEST(LegCommander, TakesOutWhatTheTransducersWillRound) {
   ControllerConfig c = puma();
   c.compensation.observer = true;
   const double scale = c.servo.readings.scale(0);
-  ServoObserver servo(c.servo, c.periodSeconds());
-  LegMotion legs;
-  legs.L = legLengths(c.legs, legCounts(c.legs, Vec6::Constant(1.5))).array() + 0.3 * scale;
-  servo.reset(legs.L, 0);
-  LegCommander commander(c);
-  commander.command(legs, true, 0, 0.0, 1.0, servo, 0.0);
+  Sender to(c);
+  LegMotion legs = moving(1.5, 0.0);
+  legs.L = legLengths(c.legs, legCounts(c.legs, legs.L)).array() + 0.3 * scale;
+  to.servo.reset(legs.L, 0);
+  to.send(legs);
   for (const double share : {0.0, 0.5, 1.0}) {
-    commander.command(legs, true, 0, 0.0, share, servo, 0.0);
-    const Vec6 taken = commander.reference() - legs.L;
+    to.send(legs, 0.0, share);
+    const Vec6 taken = to.commander.reference() - legs.L;
     EXPECT_LT((taken.array() + share * 0.3 * scale).abs().maxCoeff(), 1e-6 * scale) << share;
   }
 }
@@ -477,21 +527,84 @@ TEST(LegCommander, TakesOutWhatTheTransducersWillRound) {
 TEST(LegCommander, CarriesWhatRoundingLeavesInAdmittanceControlOnly) {
   ControllerConfig c = puma();
   c.compensation.observer = true;
-  const ServoObserver servo(c.servo, c.periodSeconds());
-  for (const double lead : {0.0, c.periodSeconds()}) {
-    LegCommander commander(c);
-    LegMotion legs;
-    legs.L = Vec6::Constant(1.5 + 0.3 * c.legs.scale(0));
+  for (const double ahead : {0.0, c.periodSeconds()}) {
+    Sender to(c);
     double sum = 0.0;
     for (int n = 0; n < 100; ++n) {
-      commander.command(legs, true, 0, lead, 1.0, servo, 0.0);
-      sum += legLengths(c.legs, commander.command().counts)(0) - commander.reference()(0);
+      to.send(moving(1.5 + 0.3 * c.legs.scale(0), 0.0), ahead);
+      sum += legLengths(c.legs, to.commander.command().counts)(0) - to.commander.reference()(0);
     }
-    if (lead > 0.0)
+    if (ahead > 0.0)
       EXPECT_LT(std::abs(sum), c.legs.scale(0));  // on average nothing is lost
     else
       EXPECT_GT(std::abs(sum), 10.0 * c.legs.scale(0));
   }
+}
+
+// Other memories
+
+TEST(RobotInertia, IsThereFromTheFirstTickOnHoweverSeldomItIsRefreshed) {
+  ControllerConfig c = puma();
+  c.compensation.inertia = true;
+  KnownPayload known(c);
+  const Transform X_IP = c.geometry.fromHome({});
+  LegMotion legs;
+  legs.L = legLengths(c.geometry, X_IP);
+  const JointVector q = JointVector::Zero();
+  RobotInertia each(c);
+  each.update(known, 0, q, X_IP, legs, true, 1.0);
+  c.compensation.mass_update = 1000;
+  RobotInertia seldom(c);
+  for (const std::int64_t count : {7, 8}) {  // armed, and again after a reset
+    seldom.update(known, count, q, X_IP, legs, true, 1.0);
+    EXPECT_EQ(seldom.M_1(), each.M_1()) << count;
+    EXPECT_GT(seldom.M_1()(0, 0), 10.0);
+    JointVector other = q;
+    other(0) = 1.0;
+    seldom.update(known, count, other, X_IP, legs, false, 0.0);
+  }
+}
+
+TEST(Overruns, EveryLimitThatMayBeSetIsKept) {
+  for (const int allowed : {0, 63, 64, 65, kMostOverruns}) {
+    SafetyLimits limits;
+    limits.stall_ticks = 10;
+    limits.overruns = allowed;
+    Overruns overruns;
+    for (std::int64_t tick = 0; tick < allowed; ++tick) overruns.take(tick, 1);
+    EXPECT_TRUE(overruns.good(limits, 10'000)) << allowed;
+    overruns.take(allowed, 1);
+    EXPECT_FALSE(overruns.good(limits, 10'000)) << allowed;
+  }
+}
+
+TEST(SensorBias, ATareThatIsCancelledOnItsWayLeavesTheBiasAsItWas) {
+  const ControllerConfig& c = puma();
+  SensorBias bias(c);
+  const Vec6 before = bias.counts();
+  bias.beginTare();
+  Sample s = numbered(0);
+  s.adc.fill(100);
+  for (int n = 0; n < kCalibrationSamples + 50; ++n) bias.stepTare(s, true, Vec6::Zero());
+  ASSERT_GT((bias.counts() - before).norm(), 1.0);  // half way
+  bias.cancelTare();
+  EXPECT_EQ(bias.counts(), before);
+  EXPECT_FALSE(bias.taring());
+}
+
+TEST(Rehearsal, LooksAtTheLastPoseWhateverTheStride) {
+  // The ramp's last tick alone leaves the workspace.
+  const ControllerConfig& c = puma();
+  const PathChecks checks(c.safety, c.geometry);
+  Segment ramp = test::segment(SegmentKind::kTrajectory, 29.99);  // 2999 periods: every second one
+  ramp.trajectory[2] = {AxisMotion::kRamp, c.safety.translation + 5e-5, 0.0, 0.0};
+  const PathPoint<6> home = atRest(Vec6::Zero());
+  Rehearsal rehearsal;
+  rehearsal.begin(MotionPlan::of({c.periodSeconds(), c.gentle}, ramp, home),
+                  legLengths(c.geometry, c.geometry.fromHome({})));
+  for (int tick = 0; rehearsal.underWay() && tick < 100; ++tick)
+    rehearsal.advance(checks, c.periodSeconds(), c.path);
+  EXPECT_EQ(rehearsal.failure(), Check::kMotionLimits);
 }
 
 }  // namespace

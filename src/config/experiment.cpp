@@ -126,6 +126,7 @@ Experiment build(const Value& document) {
   }
   c.safety =
       readSafety(root.section("safety"), c.geometry, use, legs, sensor.model.volts_per_count);
+  c.safety.alone = static_cast<double>(p.watchdog.park_after) * kSecondPerNanosecond;
   const Base base = readBase(root.section("base"));
   c.admittance = base.modes;
   if (c.compensation.inertia && c.admittance.stiffness.size() > 0) {

@@ -50,9 +50,9 @@ const PathPoint<6>& AdmittanceControl::step(const AdmittanceInput& in, const Vec
 void AdmittanceControl::slowInsideEnvelope(const Vec6& last, const Vec6& L,
                                            const PathChecks& checks) noexcept {
   const Geometry& geometry = checks.geometry();
-  const Vec6 step = model_.motion().x - last;
+  const Vec6 step = model_.motion().x - last, rate = model_.motion().x_dot;
   const auto fits = [&](double scale) {
-    const Vec6 v = scale * step / period_;
+    const Vec6 v = scale * rate;  // that a braking motion would begin with
     const double brake_time = brakeTime(v, braking_);
     const Pose next = Pose::from(last + scale * step);
     const Pose rest = Pose::from(last + scale * step + 0.5 * brake_time * v);

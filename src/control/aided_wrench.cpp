@@ -50,9 +50,14 @@ Wrench JointReaction::newest(std::int64_t time) const noexcept {
   if (!(ahead > 0.0)) return Wrench::from(filter_.output().matrix());
   Butterworth2<6> now = filter_;
   now.advance(now.prepare(ahead), (input_ + ahead * rate_).array());
-  const Vec6 y_0 = filter_.output(), y_1 = now.output(), rate = now.rate();
+  const Vec6 y_1 = now.output(), rate = now.rate();
   if (!(window_ > 0.0)) return Wrench::from(y_1 - delay_ * rate);
-  return Wrench::from(0.5 * (y_0 + y_1) - delay_ / ahead * (y_1 - y_0));
+  // Over the window, or as much of it as is ahead.
+  Butterworth2<6> begin = filter_;
+  const double before = ahead - window_;
+  if (before > 0.0) begin.advance(begin.prepare(before), (input_ + before * rate_).array());
+  const Vec6 y_0 = begin.output();
+  return Wrench::from(0.5 * (y_0 + y_1) - delay_ / std::min(ahead, window_) * (y_1 - y_0));
 }
 
 /// F_Po_P on the platform.

@@ -14,6 +14,7 @@ std::string_view name(Check check) noexcept {
     case Check::kStale: return "sample age";
     case Check::kDevice: return "device fault";
     case Check::kOverrun: return "tick overrun";
+    case Check::kLeftAlone: return "legs left alone";
     case Check::kLegReading: return "leg reading";
     case Check::kForwardKinematics: return "forward kinematics";
     case Check::kPositionError: return "position error";
@@ -73,6 +74,10 @@ bool positionErrorCheck(const SafetyLimits& limits, const Vec6& L_expected, cons
            error <= limits.position_error_still + limits.position_error_lag * speed(i);
   }
   return near;
+}
+
+bool leftAloneCheck(const SafetyLimits& limits, std::int64_t missed, double period) noexcept {
+  return static_cast<double>(missed + 1) * period < limits.alone;
 }
 
 bool pieceAgeCheck(const SafetyLimits& limits, const Sample& sample, double period) noexcept {

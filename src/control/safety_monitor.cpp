@@ -7,6 +7,7 @@ namespace ves {
 
 void SafetyMonitor::watch(const Elapsed& elapsed, const SampleStream& samples,
                           const Vec6& static_counts) noexcept {
+  missed_ = elapsed.missed;
   overruns_.take(elapsed.tick, elapsed.missed);
   if (samples.fresh()) frozen_.take(samples.sample().adc, static_counts);
 }
@@ -29,6 +30,7 @@ Checked SafetyMonitor::check(const Proposal& p, const LegContext& context,
                                pieceAgeCheck(limits, sample, period_));
   t.require(Check::kDevice, sample.faults == 0);
   t.require(Check::kOverrun, overruns_.good(limits, std::llround(1.0 / period_)));
+  t.require(Check::kLeftAlone, leftAloneCheck(limits, missed_, period_));
   t.require(Check::kLegReading, legs.readings().good());
   t.require(Check::kForwardKinematics, m.solved);
   t.require(Check::kPositionError,

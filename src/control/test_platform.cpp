@@ -120,6 +120,8 @@ void TestPlatform::legCommunication(const Checked& next) noexcept {
   if (supervisor_.stopped() || !(supervisor_.disarmed() || next.passes())) {
     motion_.hold();
     commander_.hold();
+    // They are where their watchdog took them: to hold where they were would be a leap.
+    if (next.tripped().has(Check::kLeftAlone)) commander_.release({legs_.measured().L});
     return;
   }
   motion_.commit(next.proposal().x);

@@ -101,7 +101,7 @@ std::string drawRun(Dice& dice, const Experiment& e) {
   const auto reach = [&](int i) {
     return (i < 3 ? limits.translation : limits.rotation) * coordinate(i).shown;
   };
-  const int what = dice.whole(0, 9);
+  const int what = dice.whole(0, 11);
   if (what < 4) {
     std::string text = fmt::format("trajectory {:.2f}", dice.between(0.3, 8.0));
     for (int i = 0; i < 6; ++i) {
@@ -125,10 +125,17 @@ std::string drawRun(Dice& dice, const Experiment& e) {
     return text;
   }
   if (what < 7) return "calibration";
-  return fmt::format("admittance {:.1f}", dice.between(1.0, 15.0));
+  return fmt::format("admittance {:.1f}", dice.between(1.0, 20.0));
 }
 
 std::string drawRobot(Dice& dice, const Experiment& e) {
+  const int what = dice.whole(0, 9);
+  if (e.robot.tool() && what == 0) return fmt::format("grasp {:.1f}", dice.between(0.1, 5.0));
+  if (e.robot.tool() && what == 1) return "release";
+  if (e.robot.tool() && what == 2)
+    return fmt::format("tool by {:.0f} {:.0f} {:.0f} {:.1f}", dice.between(-50.0, 50.0),
+                       dice.between(-50.0, 50.0), dice.between(-50.0, 50.0),
+                       dice.between(1.0, 4.0));
   const auto& names = e.robot.joint_names;
   const int joint = dice.whole(0, static_cast<int>(names.size()) - 1);
   const Link& link = e.controller.payload.robot.jointLink(joint);
@@ -171,7 +178,7 @@ Event drawTrouble(Dice& dice) {
     event.amount = dice.whole(1, 5);
   } else if (what < 14) {
     event.kind = Kind::kStall;
-    event.ticks = dice.whole(1, dice.chance(0.5) ? 4 : 40);
+    event.ticks = dice.whole(1, dice.chance(0.5) ? 4 : dice.chance(0.7) ? 40 : 1600);
   } else if (what < 16) {
     event.kind = Kind::kController;
     event.ticks = dice.whole(1, dice.chance(0.5) ? 60 : 1600);
@@ -242,6 +249,9 @@ Life draw(std::uint64_t seed, const std::filesystem::path& config) {
       continue;
     }
     const int what = dice.whole(0, 99);
+    // Some orders are meant to be waited for.
+    if (dice.chance(0.3)) tick += ticksOf(dice.between(2.0, 12.0));
+    if (tick >= life.ticks) break;
     if (what < 50) {
       life.events.push_back(ask(tick, drawRun(dice, e)));
     } else if (what < 62) {

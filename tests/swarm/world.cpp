@@ -9,6 +9,7 @@
 
 #include "ves/console/command.hpp"
 #include "ves/run/replay.hpp"
+#include "ves/run/robot_orders.hpp"
 #include "ves/run/run.hpp"
 #include "ves/run/run_monitor.hpp"
 #include "ves/transport/bus.hpp"
@@ -150,14 +151,17 @@ class World {
     Bus bus;
     PlantLink link;
     plant::Plant plant;
-    std::int64_t start;  // [ns] of its clock
     Sample sample;
-    Machine(Ether& ether, std::int64_t clock, const plant::PlantConfig& config, Identity who)
+    RobotOrders robot;
+    Machine(Ether& ether, std::int64_t clock, const Experiment& e,
+            const plant::PlantConfig& config, Identity who)
         : id(who),
           bus(std::make_unique<MemoryWire>(ether, clock)),
           link(bus, id),
           plant(config),
+          robot(e),
           start(bus.now()) {}
+    std::int64_t start;  // [ns] of its clock
   };
   struct Controller {
     Identity id;
@@ -214,7 +218,7 @@ class World {
                                  event.which, event.amount});
       }
     }
-    machine_.emplace(ether_, life_.clock_offset, config, Identity{1000 + machines_, 1 + machines_});
+    machine_.emplace(ether_, life_.clock_offset, e_, config, Identity{1000 + machines_, 1 + machines_});
     ++machines_;
     laws_.machineBegins();
   }
@@ -234,8 +238,11 @@ class World {
     const std::int64_t now = m.bus.now();
     m.bus.drain();
     m.link.setTime(now);
-    for (const RobotOrder& order : m.link.takeRobotOrders())
-      if (const auto* move = std::get_if<RobotMove>(&order)) m.plant.moveRobot(*move);
+    for (const RobotOrder& order : m.link.takeRobotOrders()) try {
+        if (const auto action = m.robot.take(order, m.plant.truth())) m.plant.moveRobot(*action);
+        if (const auto planned = m.robot.done(true)) m.plant.moveRobot(*planned);
+      } catch (const InputError&) {  // it cannot do that from where it is
+      }
     std::optional<Taken> taken;
     if (const auto command = m.link.takeCommand()) {
       m.plant.advance(std::max(m.plant.time(), m.link.lastHeard().time - m.start));
@@ -402,7 +409,8 @@ class World {
       const int size = message.encode(buffer.data(), 0, static_cast<int>(buffer.size()));
       ether_.send(channel, buffer.data(), static_cast<std::size_t>(size));
     };
-    if (command.verb == Verb::kRobot) {
+    if (command.verb == Verb::kRobot || command.verb == Verb::kTool ||
+        command.verb == Verb::kGrasp || command.verb == Verb::kRelease) {
       robot_command_t message = toMessage(command.robot, h);
       message.machine = machine_ ? machine_->id.source : 0;
       send(channel::kRobot, message);

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <array>
-#include <cstddef>
 
 #include "ves/control/program.hpp"
 #include "ves/control/safety_checks.hpp"

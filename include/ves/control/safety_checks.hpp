@@ -20,6 +20,7 @@ enum class Check : std::uint32_t {
   kStale,              // no new sample for too long, or one with a piece that old
   kDevice,             // legs, sensor or robot say that they are at fault
   kOverrun,            // ticks missed: one long stall, or too many in a second
+  kLeftAlone,          // so many in a row that the legs have gone home by themselves
   kLegReading,         // a leg's reading jumped as no leg can
   kForwardKinematics,  // the measured legs belong to no pose
   kPositionError,
@@ -96,6 +97,7 @@ struct SafetyLimits {
   double flow = 0.0;                  // [m^3/s] of one leg
   int stale_ticks = 0;                // [-] ticks without a new sample
   int stall_ticks = 0;                // [-] ticks missed in a row
+  double alone = HUGE_VAL;            // [s] without a command before the legs go by themselves
   int overruns = 0;                   // [-] late ticks in one second
   int pressure_min = 0;               // [count]
   int pressure_max = 0;               // [count]
@@ -115,6 +117,9 @@ bool velocityCheck(const SafetyLimits&, const Vec6& L, const Vec6& L_last, doubl
 /// [m/s] a leg has had lately, the farther behind it may be.
 bool positionErrorCheck(const SafetyLimits&, const Vec6& L_expected, const Vec6& L_measured,
                         const Vec6& speed) noexcept;
+
+/// The ticks missed in a row are fewer than the legs' own watchdog has patience for.
+bool leftAloneCheck(const SafetyLimits&, std::int64_t missed, double period) noexcept;
 
 /// No piece of the sample is older than stale_ticks.
 bool pieceAgeCheck(const SafetyLimits&, const Sample& sample, double period) noexcept;

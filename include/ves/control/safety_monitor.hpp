@@ -38,6 +38,7 @@ class SafetyMonitor {
   double period_;  // [s]
   FrozenSensor frozen_;
   Overruns overruns_;
+  std::int64_t missed_ = 0;  // [-] ticks before this one
 };
 
 }  // namespace ves

@@ -12,7 +12,7 @@
 namespace ves {
 
 // The digits that the comments of state_t.lcm and operator_t.lcm name.
-static_assert(static_cast<int>(Check::kCount) == 21);
+static_assert(static_cast<int>(Check::kCount) == 22);
 static_assert(static_cast<int>(SegmentKind::kPath) == 5 &&
               static_cast<int>(SegmentKind::kCount) == 6);
 static_assert(static_cast<int>(Request::kUncompensate) == 9);
