@@ -65,12 +65,14 @@ inline void addWorkers(CLI::App& cli, int& workers, const std::string& what) {
   cli.add_option("--workers", workers, what)->check(CLI::Range(1, 1024))->capture_default_str();
 }
 
-/// Ctrl-C, SIGTERM and a terminal that closes ask for a gentle end. A closed pipe ends nothing.
+/// Ctrl-C, SIGTERM, a terminal that closes and processor time that is used up ask for a gentle end.
+/// A closed pipe ends nothing.
 inline void catchSignals() {
   struct sigaction action {};
   action.sa_handler = [](int) { stop_requested = 1; };
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
+  sigaction(SIGXCPU, &action, nullptr);
   action.sa_handler = [](int) {
     stop_requested = 1;
     const int nowhere = open("/dev/null", O_RDWR);

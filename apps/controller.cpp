@@ -99,10 +99,17 @@ int controllerCommand(int argc, char** argv) {
   cli.add_flag("!--no-plots", options.plots, "leave the plots out");
   return run(cli, argc, argv, [&] {
     const bool alone = options.no_menu || options.process.start || options.process.lockstep;
-    if (!options.commands.empty() && alone)
-      throw InputError("--do: not with --no-menu, --start or --lockstep");
-    return alone || (options.commands.empty() && !isatty(STDIN_FILENO)) ? serve(options)
-                                                                        : console(options);
+    const auto refuse = [&](const char* option, bool given, const char* instead) {
+      if (given && alone)
+        throw InputError(
+            fmt::format("{}: not with --no-menu, --start or --lockstep; {}", option, instead));
+    };
+    refuse("--do", !options.commands.empty(), "want orders over the bus");
+    refuse("--out", !options.out.empty(), "want --log FILE, or ves run");
+    refuse("--plant", options.plant, "want ves plant beside it, or ves run");
+    // Lines of the menu may come through a pipe; without a word of them it is the process alone.
+    const bool session = options.plant || !options.out.empty() || !options.commands.empty();
+    return alone || (!session && !isatty(STDIN_FILENO)) ? serve(options) : console(options);
   });
 }
 

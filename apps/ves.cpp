@@ -4,6 +4,8 @@
 #include <string_view>
 
 #include "app.hpp"
+#include <csignal>
+
 #include "commands.hpp"
 #include "ves/base/build.hpp"
 
@@ -139,4 +141,7 @@ int dispatch(int argc, char** argv) {
 }  // namespace
 }  // namespace ves::app
 
-int main(int argc, char** argv) { return ves::app::dispatch(argc, argv); }
+int main(int argc, char** argv) {
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that may grow no more is an error of its writer
+  return ves::app::dispatch(argc, argv);
+}

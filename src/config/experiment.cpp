@@ -168,6 +168,8 @@ Experiment build(const Value& document) {
   p.climate = sensor.climate;
   p.payload = c.payload;
   p.gravity = c.gravity;
+  if (root.has("reality") && root.has("plant_mismatch"))
+    root.fail("reality", "is the old name of plant_mismatch, which is there too; want one of them");
   for (const char* key : {"plant_mismatch", "reality"})
     if (root.has(key)) readPlantMismatch(root.section(key), p);
   if (root.has("reality"))
@@ -206,6 +208,12 @@ Experiment build(const Value& document) {
   }
 
   readProgram(root, out);
+  ToldLoads& told = c.told_loads;
+  std::stable_sort(told.loads.begin(), told.loads.begin() + told.size,
+                   [](const ToldLoad& a, const ToldLoad& b) {
+                     return std::pair(a.cue.segment, a.cue.after) <
+                            std::pair(b.cue.segment, b.cue.after);
+                   });
   if (p.world) {
     const int segment = admittanceSegment(c.program);
     p.world->release = segment < c.program.size ? segment : -1;

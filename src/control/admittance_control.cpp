@@ -58,8 +58,10 @@ void AdmittanceControl::slowInsideEnvelope(const Vec6& last, const Vec6& L,
     const Pose rest = Pose::from(last + scale * step + 0.5 * brake_time * v);
     const Transform X_rest = geometry.fromHome(rest);
     const Vec6 L_next = legLengths(geometry, geometry.fromHome(next));
+    const Pose then = Pose::from(last + scale * step + period_ * v);  // no braking is faster
     return !checks.pose(X_rest, rest, legLengths(geometry, X_rest)).any() &&
-           !checks.step(L_next, L, period_).any();
+           !checks.step(L_next, L, period_).any() &&
+           !checks.step(legLengths(geometry, geometry.fromHome(then)), L_next, period_).any();
   };
   scale_ = 1.0;
   if (fits(1.0)) return;

@@ -234,15 +234,13 @@ PathPoint<6> AdmittanceModel::at(
 }
 
 void AdmittanceModel::slow(double share) noexcept {
-  const auto& Phi = dynamics_.Phi();
   Modes& modes = now_.modes;
-  PathPoint<6>& motion = now_.motion;
+  PathPoint<6>& motion = now_.motion;  // which may be ahead of the modes
   modes.eta = before_.modes.eta + share * (modes.eta - before_.modes.eta);
   modes.eta_dot *= share;
   motion.x = before_.motion.x + share * (motion.x - before_.motion.x);
-  motion.x_dot.noalias() = Phi * modes.eta_dot;
-  motion.x_ddot.noalias() = Phi * (modes.eta_dot - before_.modes.eta_dot);
-  motion.x_ddot /= period_;
+  motion.x_dot *= share;
+  motion.x_ddot = (motion.x_dot - before_.motion.x_dot) / period_;
 }
 
 }  // namespace ves

@@ -66,22 +66,24 @@ std::int64_t Ticker::wait() noexcept {
   return missed;
 }
 
-bool claimRealtime(int priority, bool required) {
+std::string claimRealtime(int priority, bool required) {
   sched_param param{};
   param.sched_priority = priority;
-  const char* refused = nullptr;
-  if (sched_setscheduler(0, SCHED_FIFO, &param) != 0)
-    refused = "SCHED_FIFO";
-  else if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0)
-    refused = "locked memory";
-  if (!refused) {
+  std::string refused;
+  const auto refuse = [&](const char* what) {
+    refused += fmt::format("{}{} refused: {}", refused.empty() ? "" : "; ", what,
+                           std::strerror(errno));
+  };
+  // Threads and processes that are begun later have the ordinary priority.
+  if (sched_setscheduler(0, SCHED_FIFO | SCHED_RESET_ON_FORK, &param) != 0) refuse("SCHED_FIFO");
+  if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0)
+    refuse("locked memory");
+  else
     prefaultStack();
-    return true;
-  }
-  const std::string reason = fmt::format("{} refused: {} (see ulimit -r and -l, or run as root)",
-                                         refused, std::strerror(errno));
-  if (required) throw InputError("--realtime: " + reason);
-  return false;
+  if (required && !refused.empty())
+    throw InputError(
+        fmt::format("--realtime: {} (see ulimit -r and -l, or run as root)", refused));
+  return refused;
 }
 
 }  // namespace ves

@@ -59,6 +59,7 @@ Series readSeries(const std::string& log) {
   std::optional<Identity> controller;
   std::int64_t tick = -1;
   bool over = false, told = false;
+  std::int64_t twice = 0;  // [-] ticks
   while (reader.next(event)) {
     if (event.channel == channel::kState) {
       if (const auto state = event.as<state_t>()) {
@@ -73,6 +74,10 @@ Series readSeries(const std::string& log) {
                 "{}: byte {}: another controller's run begins here (two logs put together?); its "
                 "ticks are left out",
                 log, event.offset));
+          continue;
+        }
+        if (state->header.sequence == tick) {  // recorded twice
+          ++twice;
           continue;
         }
         tick = state->header.sequence;
@@ -91,6 +96,8 @@ Series readSeries(const std::string& log) {
     }
   }
   if (const auto row = rows.finish()) series.rows.push_back(*row);
+  if (twice > 0)
+    series.damage.add(fmt::format("{}: {} ticks stand there twice; each is taken once", log, twice));
   if (series.damage.any() && (!configured || series.rows.empty()))
     throw InputError(series.damage.first());
   if (!configured)

@@ -11,7 +11,8 @@ namespace ves {
 FlightRecord::FlightRecord(const Experiment& experiment, std::filesystem::path folder)
     : experiment_(experiment), folder_(std::move(folder)) {
   const double period = static_cast<double>(experiment.controller.period) * kSecondPerNanosecond;
-  ticks_.reserve(static_cast<std::size_t>(kKept / period));
+  for (std::vector<Tick>* ring : {&ticks_, &written_ticks_})
+    ring->reserve(static_cast<std::size_t>(kKept / period));
 }
 
 void FlightRecord::keep(const state_t& state, const sample_t& sample) {
@@ -24,13 +25,24 @@ void FlightRecord::keep(const state_t& state, const sample_t& sample) {
   constexpr std::int64_t kMoment = 20;  // [-] ticks
   stopped_ = state.phase == static_cast<int>(Phase::kStopped) ? state.cause_tick : -1;
   if (stopped_ >= 0 && stopped_ != written_ && state.header.sequence - stopped_ >= kMoment) {
-    written_ = stopped_;
-    write(stopped_);
+    begin(stopped_);
   }
 }
 
+/// What was kept goes to the writer; a stop within the next seconds has what came since.
+void FlightRecord::begin(std::int64_t tick) {
+  if (writer_.joinable()) writer_.join();
+  written_ = tick;
+  std::swap(ticks_, written_ticks_);
+  written_next_ = written_ticks_.size() < written_ticks_.capacity() ? 0 : next_;
+  ticks_.clear();
+  next_ = 0;
+  writer_ = std::thread([this, tick] { write(tick); });
+}
+
 FlightRecord::~FlightRecord() {
-  if (stopped_ >= 0 && stopped_ != written_) write(stopped_);
+  if (stopped_ >= 0 && stopped_ != written_) begin(stopped_);
+  if (writer_.joinable()) writer_.join();
 }
 
 void FlightRecord::write(std::int64_t tick) const {
@@ -38,9 +50,8 @@ void FlightRecord::write(std::int64_t tick) const {
   try {
     LogWriter log(file);
     log.write(channel::kExperiment, describe(experiment_, {}, 0), 0);
-    const std::size_t oldest = ticks_.size() < ticks_.capacity() ? 0 : next_;
-    for (std::size_t i = 0; i < ticks_.size(); ++i) {
-      const Tick& t = ticks_[(oldest + i) % ticks_.size()];
+    for (std::size_t i = 0; i < written_ticks_.size(); ++i) {
+      const Tick& t = written_ticks_[(written_next_ + i) % written_ticks_.size()];
       log.write(channel::kSample, t.sample, t.state.header.time_ns);
       log.write(channel::kState, t.state, t.state.header.time_ns);
     }

@@ -43,6 +43,7 @@ bool followBus(const std::string& url, const std::function<bool()>& stop,
   while (!stop()) {
     bus.wait(100);
     bus.drain();
+    bus.rethrow();
     const std::int64_t now = monotonicNow();
     if (controller && now - heard > 2 * kSecond) break;
     if (!controller || described || now - asked < kSecond) continue;

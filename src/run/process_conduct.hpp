@@ -13,9 +13,8 @@
 namespace ves {
 
 inline void enableRealtime(const char* who, int priority, bool required) {
-  if (!claimRealtime(priority, required))
-    fmt::print(stderr,
-               "{}: no real-time privileges, running at best effort; ./ves doctor says why\n", who);
+  if (const std::string refused = claimRealtime(priority, required); !refused.empty())
+    fmt::print(stderr, "{}: runs at best effort: {}; ./ves doctor says more\n", who, refused);
 }
 
 inline void warnOfOpenBus(const char* who, const std::string& url) {

@@ -83,6 +83,7 @@ bool Session::listen(int milliseconds, int descriptor) {
   pollfd wait[2] = {{bus_.descriptor(), POLLIN, 0}, {descriptor, POLLIN, 0}};
   poll(wait, descriptor < 0 ? 1 : 2, milliseconds);
   bus_.drain();
+  bus_.rethrow();
   if (plant_ && !plant_->running() && controller_->running()) {
     interrupt();
     throw InputError(fmt::format("ves plant ended early, status {}", plant_->status()));

@@ -20,6 +20,7 @@ namespace {
 
 // More than wait after any stall that a run survives: a stalled controller finds the newest.
 constexpr int kAtOnce = 4096;                     // [-] datagrams
+constexpr std::size_t kLongestFixed = 4096;       // [B] of the messages that have one size
 constexpr std::int64_t kMillisecond = 1'000'000;  // [ns]
 constexpr std::int64_t kAwake = 50'000;           // [ns]
 
@@ -65,9 +66,9 @@ class Multicast : public Wire {
   bool send(const std::string& channel, const void* data, std::size_t size) noexcept override {
     return lcm_.publish(channel, data, static_cast<unsigned>(size)) == 0;
   }
-  void hear(const std::string& channel) override {
+  void hear(const std::string& channel, std::size_t longest) override {
     if (!receiver_) receiver_.emplace(address_.group, address_.port);
-    receiver_->hear(channel);
+    receiver_->hear(channel, longest);
   }
   bool read(std::optional<Received>& message) noexcept override {
     return receiver_ && receiver_->read(message);
@@ -184,7 +185,7 @@ bool Bus::lets(const Received& message, const std::string& channel) noexcept {
 
 void Bus::subscribe(const std::vector<std::string>& channels, const Handler& handler) {
   for (const std::string& channel : channels) {
-    wire_->hear(channel);
+    wire_->hear(channel, channel == channel::kExperiment ? Receiver::kLongest : kLongestFixed);
     subscriptions_.push_back({channel, handler});
   }
 }
@@ -198,9 +199,17 @@ bool Bus::handOut(const Received& message) noexcept {
     let = let || lets(message, s.channel);
     if (!let) return false;
     arrival_ = message.arrival;
-    s.handler(s.channel, message.data, message.size);
+    try {
+      s.handler(s.channel, message.data, message.size);
+    } catch (...) {
+      if (!failure_) failure_ = std::current_exception();
+    }
   }
   return let;
+}
+
+void Bus::rethrow() {
+  if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
 }
 
 void Bus::drain() noexcept {
@@ -360,7 +369,8 @@ PlantLink::PlantLink(Bus& bus, const std::optional<Identity>& self) : bus_(bus),
                 [this](const std::string&, const void* data, std::uint32_t size) {
                   const auto message = decode<robot_command_t>(data, size);
                   const auto order = message ? fromMessage(*message) : std::nullopt;
-                  if (!order || !means(message->machine)) {
+                  if (!order || !means(message->machine) ||
+                      robot_orders_.size() >= kRobotOrders) {
                     ++rejected_;
                     return;
                   }

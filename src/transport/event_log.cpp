@@ -63,6 +63,15 @@ LogWriter::~LogWriter() { flush(); }
 
 void LogWriter::write(const std::string& channel, const void* data, std::int64_t size,
                       std::int64_t time_ns) noexcept {
+  // The buffer has room for all but an experiment_t, which comes first.
+  if (waiting_.size() + channel.size() + static_cast<std::size_t>(kHeaderSize + size) >
+      waiting_.capacity()) try {
+      waiting_.reserve(2 * waiting_.capacity() + static_cast<std::size_t>(size));
+    } catch (const std::bad_alloc&) {
+      error_ = ENOMEM;
+      ++lost_;
+      return;
+    }
   const auto* bytes = static_cast<const std::uint8_t*>(data);
   put(waiting_, kSync, 4);
   put(waiting_, static_cast<std::uint64_t>(events_++), 8);

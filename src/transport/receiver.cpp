@@ -112,17 +112,25 @@ Receiver::Receiver(const std::string& address, std::uint16_t port) : datagram_(k
 
 Receiver::~Receiver() { close(fd_); }
 
-void Receiver::hear(const std::string& channel) {
-  if (hears(channel)) return;
-  channels_.push_back(channel);
-  std::vector<sock_filter> program = filter(channels_);
+void Receiver::hear(const std::string& channel, std::size_t longest) {
+  for (Channel& known : channels_)
+    if (known.name == channel) {
+      known.longest = std::max(known.longest, longest);
+      return;
+    }
+  channels_.push_back({channel, longest});
+  std::vector<std::string> names;
+  for (const Channel& one : channels_) names.push_back(one.name);
+  std::vector<sock_filter> program = filter(names);
   const sock_fprog filter{static_cast<unsigned short>(program.size()), program.data()};
   // Where the kernel has none of this, read() does it alone.
   setsockopt(fd_, SOL_SOCKET, SO_ATTACH_FILTER, &filter, sizeof filter);
 }
 
-bool Receiver::hears(std::string_view channel) const noexcept {
-  return std::find(channels_.begin(), channels_.end(), channel) != channels_.end();
+std::size_t Receiver::longest(std::string_view channel) const noexcept {
+  for (const Channel& one : channels_)
+    if (one.name == channel) return one.longest;
+  return 0;
 }
 
 bool Receiver::readable(std::int64_t until) const noexcept {
@@ -151,8 +159,11 @@ bool Receiver::read(std::optional<Received>& message) noexcept {
   if (size < kWholeHeader) return true;
   const std::uint32_t magic = word(datagram_.data());
   if (magic == kWhole) message = whole(size);
-  if (magic == kPart)
-    message = part(size, std::uint64_t{from.sin_addr.s_addr} << 16 | from.sin_port);
+  if (magic == kPart) try {
+      message = part(size, std::uint64_t{from.sin_addr.s_addr} << 16 | from.sin_port);
+    } catch (const std::bad_alloc&) {
+      parts_.clear();  // there is no memory for them
+    }
   if (message) {
     const std::int64_t now = monotonicNow();
     message->arrival = arrivalOf(header, now, wallNow() - now, kLongestWait);
@@ -163,8 +174,9 @@ bool Receiver::read(std::optional<Received>& message) noexcept {
 std::optional<Received> Receiver::whole(std::size_t size) const noexcept {
   const std::uint8_t* const begin = datagram_.data() + kWholeHeader;
   const auto channel = nameIn(begin, size - kWholeHeader);
-  if (!channel || !hears(*channel)) return {};
+  if (!channel) return {};
   const std::size_t before = kWholeHeader + channel->size() + 1;
+  if (size - before > longest(*channel)) return {};
   return Received{*channel, datagram_.data() + before, static_cast<std::uint32_t>(size - before),
                   0};
 }
@@ -183,7 +195,7 @@ std::optional<Received> Receiver::part(std::size_t size, std::uint64_t sender) {
   if (first) {
     if (known != parts_.end()) parts_.erase(known);
     const auto channel = nameIn(data, bytes);
-    if (!channel || !hears(*channel) || length > kLongest) return {};
+    if (!channel || length > longest(*channel)) return {};
     if (parts_.size() == kSenders) parts_.erase(parts_.begin());
     parts_.push_back({sender, sequence, length, std::string(*channel), {}});
     data += channel->size() + 1;

@@ -8,7 +8,9 @@
 #include <map>
 
 #include "cdr.hpp"
+#include "ves/base/big_endian.hpp"
 #include "ves/transport/channels.hpp"
+#include "ves/transport/fields.hpp"
 #include "ves/view/lcm_definition.hpp"
 #include "ves/view/mcap.hpp"
 #include "ves/view/sources.hpp"
@@ -74,7 +76,9 @@ class McapExport::Impl {
   }
 
   void add(const LogEvent& event) {
-    const std::int64_t now = event.time_us * 1000;
+    const std::optional<std::int64_t> time = timeOf(event);
+    if (!time) return;
+    const std::int64_t now = *time;
     if (std::exchange(first_, false)) begin(now);
     message(event, now);
     if (event.channel != channel::kState) {
@@ -100,6 +104,19 @@ class McapExport::Impl {
   }
 
  private:
+  /// [ns] By the run's own clock, begun at the first event's time: a recorder's wall clock may stand
+  /// at zero, or be set back. Nothing for an event that stands there twice.
+  std::optional<std::int64_t> timeOf(const LogEvent& event) {
+    if (event.data.size() < kFingerprintSize + kHeaderSize) return event.time_us * 1000;
+    const auto field = [&](std::size_t at) {
+      return static_cast<std::int64_t>(bigEndian(&event.data[kFingerprintSize + at], 8));
+    };
+    const std::int64_t time = field(0), sequence = field(8), source = field(16);
+    const auto [last, first] = last_.try_emplace({event.channel, source}, sequence);
+    if (!first && std::exchange(last->second, sequence) == sequence) return {};
+    return time + clocks_.try_emplace(source, event.time_us * 1000 - time).first->second;
+  }
+
   std::uint16_t channel(const std::string& topic, const std::string& schema,
                         const std::string& text) {
     return out_.addChannel(topic, "cdr", schema, "ros2msg", text);
@@ -302,6 +319,8 @@ class McapExport::Impl {
   const std::string version_;
   McapWriter out_;
   bool first_ = true;
+  std::map<std::int64_t, std::int64_t> clocks_;  // [ns] by source: from its own clock
+  std::map<std::pair<std::string, std::int64_t>, std::int64_t> last_;  // [-] sequence
   RowMaker rows_;
   Identity controller_;     // whose run it is
   std::int64_t tick_ = -1;  // the last

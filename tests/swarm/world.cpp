@@ -49,7 +49,7 @@ class MemoryWire : public Wire {
     ether_.send(channel, data, size);
     return true;
   }
-  void hear(const std::string& channel) override { channels_.push_back(channel); }
+  void hear(const std::string& channel, std::size_t) override { channels_.push_back(channel); }
   bool read(std::optional<Received>& message) noexcept override {
     if (inbox_.empty() || inbox_.begin()->first > ether_.now) return false;
     in_hand_ = std::move(inbox_.extract(inbox_.begin()).mapped());

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 
 struct msghdr;
 
@@ -40,8 +41,8 @@ class Ticker {
 };
 
 /// Real-time conduct of this process: SCHED_FIFO at `priority`, memory locked, stack touched. When
-/// `required`,
-/// throws InputError with the reason; otherwise says whether both were granted.
-bool claimRealtime(int priority, bool required);
+/// `required`, throws InputError with the reason. Returns what was refused, and why; empty: nothing.
+/// Threads that are begun afterwards do not inherit it.
+std::string claimRealtime(int priority, bool required);
 
 }  // namespace ves

@@ -8,6 +8,7 @@
 
 #include <array>
 #include <cstdint>
+#include <exception>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -54,8 +55,9 @@ class Wire {
  public:
   virtual ~Wire() = default;
   virtual bool send(const std::string& channel, const void* data, std::size_t size) noexcept = 0;
-  /// From now on this channel's messages are read too. Throws InputError.
-  virtual void hear(const std::string& channel) = 0;
+  /// From now on this channel's messages, of at most `longest` bytes, are read too. Throws
+  /// InputError.
+  virtual void hear(const std::string& channel, std::size_t longest) = 0;
   /// Receiver::read, ::readable and ::descriptor; nothing, never and -1 before hear().
   virtual bool read(std::optional<Received>& message) noexcept = 0;
   virtual bool readable(std::int64_t until) const noexcept = 0;
@@ -85,13 +87,15 @@ class Bus {
   /// For the one message that has no fixed size.
   void publish(const std::string& channel, const experiment_t& message);
 
-  /// Every message of these channels, as bytes.
+  /// Every message of these channels, as bytes. What a handler throws is kept for rethrow().
   using Handler =
       std::function<void(const std::string& channel, const void* data, std::uint32_t size)>;
   void subscribe(const std::vector<std::string>& channels, const Handler& handler);
 
   /// Hands out what has arrived: all, unless somebody floods the bus.
   void drain() noexcept;
+  /// The first exception of a handler, once: not where it came up, in the loop that reads the bus.
+  void rethrow();
   /// Readable when a message has arrived. After the first subscription, as wait().
   int descriptor() const noexcept { return wire_->descriptor(); }
   /// Waits for one message; false when none came in time, or a signal did.
@@ -121,6 +125,7 @@ class Bus {
   std::optional<Key> key_;
   std::vector<Subscription> subscriptions_;
   ReplayGuard guard_;
+  std::exception_ptr failure_;
   Refused refused_;
   std::int64_t arrival_ = 0;  // [ns]
   std::int64_t failed_ = 0;
@@ -226,6 +231,7 @@ class PlantLink {
  public:
   /// A controller keeps the legs until it lets go or is silent for so long.
   static constexpr std::int64_t kSilence = 500'000'000;  // [ns]
+  static constexpr std::size_t kRobotOrders = 16;        // [-]
 
   /// Commands and orders that name another machine than `self` are not for this one; on a bus with
   /// a key they have to name it: those of an earlier machine are recordings. The driver of one
@@ -246,6 +252,7 @@ class PlantLink {
     std::int64_t time = 0;  // [ns] of arrival
   };
   const Heard& lastHeard() const noexcept { return last_heard_; }
+  /// At most kRobotOrders wait; what comes then is not let in.
   std::vector<RobotOrder> takeRobotOrders() { return std::exchange(robot_orders_, {}); }
   std::int64_t rejected() const noexcept { return rejected_; }
 

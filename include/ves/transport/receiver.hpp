@@ -33,8 +33,9 @@ class Receiver {
   Receiver(const Receiver&) = delete;
   Receiver& operator=(const Receiver&) = delete;
 
-  /// From now on this channel's messages too. The kernel drops those of all others.
-  void hear(const std::string& channel);
+  /// From now on this channel's messages too, those of at most `longest` bytes. The kernel drops
+  /// those of all others.
+  void hear(const std::string& channel, std::size_t longest = kLongest);
 
   /// Readable when a datagram waits.
   int descriptor() const noexcept { return fd_; }
@@ -57,10 +58,15 @@ class Receiver {
   };
   std::optional<Received> whole(std::size_t size) const noexcept;
   std::optional<Received> part(std::size_t size, std::uint64_t sender);
-  bool hears(std::string_view channel) const noexcept;
+  /// [bytes] of a message on this channel; 0: it is not heard.
+  std::size_t longest(std::string_view channel) const noexcept;
 
+  struct Channel {
+    std::string name;
+    std::size_t longest;
+  };
   int fd_ = -1;
-  std::vector<std::string> channels_;
+  std::vector<Channel> channels_;
   std::vector<std::uint8_t> datagram_;
   std::vector<Parts> parts_;  // one of a sender, the newest last
   Parts complete_;            // that was handed out
