@@ -69,6 +69,49 @@ std::vector<Requirement> move(const Experiment& experiment, const ProcessOptions
            crossed.empty()}};
 }
 
+/// Follows commands a millimetre ahead of where it is to rest, and then hears no more.
+Requirement silence(const Experiment& experiment, const std::string& url) {
+  constexpr int kTicks = 50;            // [-] of commands
+  constexpr std::int32_t kAhead = 15;   // [count]
+  constexpr double kStill = 2.0;        // [count]
+  const std::int64_t period = experiment.controller.period;
+  const Identity self = Identity::draw();
+  const setup_t setup = setupOf(experiment, false, header(self, 0, 0));
+  Bus bus(url);
+  Announcer announcer(bus, url, describe(experiment, self, 0), setup);
+  ControllerLink link(bus, self);
+  std::int64_t tick = 0;
+  const auto run = [&](const LegCommand& command, int ticks) {
+    for (Ticker ticker(period); ticks-- > 0 && !stop_requested; ++tick) {
+      ticker.wait();
+      bus.drain();
+      if (tick > 0) link.send(toMessage(command, header(self, tick, monotonicNow())));
+    }
+  };
+  const auto apart = [&](const LegCounts& from) {
+    double most = 0.0;
+    for (std::size_t i = 0; i < kLegs; ++i)
+      most = std::max(most, std::abs(static_cast<double>(link.sample().legs[i] - from[i])));
+    return most;
+  };
+  run({}, static_cast<int>(2 * PlantLink::kSilence / period));  // the last controller's are free now
+  LegCommand command;
+  command.engaged = true;
+  command.rest = command.counts = link.sample().legs;
+  for (std::int32_t& count : command.counts) count += kAhead;
+  run(command, kTicks);
+  const double followed = apart(command.rest);
+  const std::int64_t until = monotonicNow() + setup.hold_after_ns + 1'000'000'000;
+  while (monotonicNow() < until && !stop_requested) bus.wait(20);
+  bus.drain();
+  const double off = apart(command.rest);
+  run({}, 3);
+  return {"silence", fmt::format("rests at `rest` after {:.0f} ms without a command",
+                                 static_cast<double>(setup.hold_after_ns) * 1e-6),
+          fmt::format("{:.0f} counts from it, of {:.0f} that it was led away", off, followed),
+          off <= kStill && followed > 0.5 * kAhead};
+}
+
 }  // namespace
 
 int conformCommand(int argc, char** argv) {
@@ -103,6 +146,8 @@ int conformCommand(int argc, char** argv) {
     if (moves && well) {
       options.process.start = true;
       for (const Requirement& r : move(experiment, options.process)) all.push_back(r);
+      if (std::all_of(all.begin(), all.end(), kept))
+        all.push_back(silence(experiment, options.process.url));
     }
     for (const Requirement& r : all)
       fmt::print("{} {:<16} {:<42} {}\n", r.kept ? "ok" : "NO", r.name, r.asked, r.found);

@@ -480,5 +480,30 @@ TEST(Urdf, RefusesWithFileLineAndName) {
     EXPECT_EQ(urdfRefusal(text).find('\n'), std::string::npos);
 }
 
+TEST(Config, TheOldNameOfPlantMismatchDoesNotApplyTwice) {
+  const auto load = [](const std::vector<std::string>& set) {
+    return loadExperiment(test::configDir() + "/scenarios/z_sine.yaml", set);
+  };
+  EXPECT_NE(test::refusal([&] {
+              load({"reality={gain_extend: 0.5}", "plant_mismatch={gain_extend: 0.5}"});
+            }).find("want one of them"),
+            std::string::npos);
+  EXPECT_EQ(load({"reality={gain_extend: 0.5}"}).plant.actuator.gain_extend,
+            load({"plant_mismatch={gain_extend: 0.5}"}).plant.actuator.gain_extend);
+}
+
+TEST(Config, LoadsAreToldInTheOrderOfTheirTimes) {
+  // Released after it was grasped, and told sooner.
+  const Experiment e = loadExperiment(
+      test::configDir() + "/scenarios/puma_on_table_4_1.yaml",
+      {"program=[{admittance: {duration_s: 14}, robot: [{at_s: 1, grasp: {mass_kg: 2, center_m: [0, 0, 0], "
+       "inertia_kg_m2: [0.01, 0.01, 0.01, 0, 0, 0], told_after_s: 5}}, {at_s: 3, release: {told_after_s: 0.5}}]}]"});
+  const ToldLoads& told = e.controller.told_loads;
+  ASSERT_EQ(told.size, 2);
+  EXPECT_EQ(told.loads[0].cue.after, 3'500'000'000);
+  EXPECT_EQ(told.loads[0].body.mass, 0.0);
+  EXPECT_EQ(told.loads[1].cue.after, 6'000'000'000);
+}
+
 }  // namespace
 }  // namespace ves

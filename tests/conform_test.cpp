@@ -211,6 +211,7 @@ INSTANTIATE_TEST_SUITE_P(One, WrongMachine,
                                          Wrong{"stalled clock", "clock"}, Wrong{"NaN", "ranges"},
                                          Wrong{"epoch 0", "epoch"},
                                          Wrong{"ADC out of range", "ranges"},
+                                         Wrong{"keeps its reference", "silence"},
                                          Wrong{"swapped legs", "which leg"}),
                          [](const auto& tried) {
                            std::string name = tried.param.what;

@@ -326,5 +326,72 @@ TEST_F(Console, LcmLogplayerPlaysSamplesIntoALiveController) {
   player.wait();
 }
 
+TEST(Commands, EveryWordThatTheMenuAdvertisesIsUnderstood) {
+  for (const Item& item : menu()) EXPECT_EQ(parseVerb(item.word), item.verb);
+  for (const char* word : {"hold", "stop"}) {  // which act at once
+    const Command command = parseCommand(word, puma());
+    EXPECT_EQ(name(command.order.request), word);
+  }
+}
+
+TEST_F(Console, AStopComesHomeAndEndsTheSession) {
+  const Output o = sh(session("--do arm --do 'move x 10' --do stop --do 'move x 20' --out a"));
+  EXPECT_EQ(o.status, 0) << o.text;
+  EXPECT_NE(o.text.find("parked, legs at home"), std::string::npos) << o.text;
+  EXPECT_EQ(o.text.find("x +20"), std::string::npos) << o.text;
+  EXPECT_NE(o.text.find("left out: move x 20"), std::string::npos) << o.text;
+  EXPECT_EQ(summary(folder_ / "a")["ended"], "parked");
+}
+
+TEST_F(Console, LinesOfTheMenuMayComeThroughAPipe) {
+  const std::string whole = "cd " + folder_.string() + "; printf 'arm\nmove x 10\nwait 2\nstop\n' | ( " +
+                            app("controller") + "z_sine --plant --private-bus --no-plots " +
+                            patient() + " --out a )";
+  const std::string piped = "bash -c \"" + whole + "\"";
+  const Output o = sh(piped);
+  EXPECT_EQ(o.status, 0) << o.text;
+  EXPECT_NE(o.text.find("parked, legs at home"), std::string::npos) << o.text;
+}
+
+TEST_F(Console, WhatTheBareProcessCannotDoIsRefused) {
+  for (const char* options : {"--start --out a", "--no-menu --plant", "--start --lockstep --out a"}) {
+    const Output o = sh("cd " + folder_.string() + "; " + app("controller") + "z_sine " + options);
+    EXPECT_EQ(o.status, 2) << options << o.text;
+    EXPECT_NE(o.text.find("want "), std::string::npos) << o.text;
+    EXPECT_FALSE(fs::exists(folder_ / "a")) << options;
+  }
+}
+
+TEST_F(Console, AControllerThatMayWriteNoMoreBringsThePlatformHome) {
+  // SIGXFSZ ends a process that has not said otherwise, in the middle of the motion.
+  const Output o = sh("cd " + folder_.string() + "; ulimit -f 40; " + app("controller") +
+                      "z_sine --lockstep --start --log a.lcmlog & controller=$!; " +
+                      app("plant") + "z_sine --lockstep & wait $controller; status=$?; "
+                      "kill $!; exit $status");
+  EXPECT_EQ(o.status, 0) << o.text;
+}
+
+TEST_F(Console, AControllerThatWasSuspendedStopsAndTheLegsStay) {
+  enterPrivateBus();
+  BusObserver w;
+  const std::string patience = "legs.watchdog.park_after_s=2";
+  Process plant = start("plant", {"z_sine", "--set", patience});
+  Process controller = start("controller", {"z_sine", "--start", "--set", patience});
+  ASSERT_TRUE(w.until([&] { return w.phase() == Phase::kRunning && w.engaged > 250; }));
+  controller.signal(SIGTSTP);
+  ASSERT_TRUE(w.rests());
+  const Vec6 held = w.legs;
+  const auto off = [&] { return (w.legs - held).cwiseAbs().maxCoeff(); };
+  ASSERT_TRUE(w.until([&] { return off() > 1e-3; }));  // on their way home, alone
+  controller.signal(SIGCONT);
+  ASSERT_TRUE(w.until([&] { return w.phase() == Phase::kStopped; }));
+  EXPECT_EQ(w.cause(), Check::kLeftAlone);
+  const Vec6 found = w.legs;
+  ASSERT_TRUE(w.rests());
+  EXPECT_LT((w.legs - found).cwiseAbs().maxCoeff(), 2e-3);  // it lets go of them
+  controller.signal(SIGHUP);
+  EXPECT_EQ(controller.wait(), 1);
+}
+
 }  // namespace
 }  // namespace ves

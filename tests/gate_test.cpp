@@ -257,5 +257,29 @@ TEST(LoopModel, BasesKeepTheModesThatTheRuleGives) {
   }
 }
 
+TEST(Gate, NothingOfTheSimulatedMachineChangesItsVerdict) {
+  // Every key that makes the plant another one than is believed.
+  const auto verdict = [](const std::vector<std::string>& set) {
+    const Experiment e = test::experiment("puma_on_table_4_1", test::kCompensated, set);
+    const LoopVerdict v = assessStability(e.controller, e.plant);
+    return std::tuple(v.stable, v.as_believed, v.worst.radius, v.worst.frequency);
+  };
+  const auto as_believed = verdict({});
+  for (const char* key : {"gain_extend", "gain_retract", "tau", "sensor_cutoff", "mass", "center"})
+    for (const double factor : {0.5, 2.5})
+      EXPECT_EQ(verdict({fmt::format("plant_mismatch={{{}: {}}}", key, factor)}), as_believed)
+          << key << factor;
+}
+
+TEST(Gate, LooksAtTheServosThatWereIdentified) {
+  Experiment e = test::experiment("puma_on_table_4_1", test::kCompensated);
+  const double nominal = loopOf(e.controller, e.plant, e.plant.initial_joints,
+                                Direction::kExtending).velocity_gain;
+  e.controller.servo.extend *= 0.75;
+  EXPECT_NEAR(loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kExtending)
+                  .velocity_gain,
+              0.75 * nominal, 1e-12 * nominal);
+}
+
 }  // namespace
 }  // namespace ves

@@ -238,5 +238,45 @@ TEST_F(Programs, SecondControllerRefusesToArmAndTheFirstGoesOn) {
   EXPECT_EQ(phase, Phase::kParked);
 }
 
+TEST_F(Programs, AnMcapFileThatCannotBeWrittenIsOneLine) {
+  ASSERT_EQ(run("ramp --lockstep --no-plots" + out("a")).status, 0);
+  const Output log = sh(app("collect") + (folder_ / "a/run.lcmlog").string() +
+                        " --mcap /nonexistent/x.mcap");
+  EXPECT_EQ(log.status, 2) << log.text;
+  // Of a run on the bus too: what a callback throws ends in a line, and not the process.
+  const Output follow =
+      sh(app("on-bus") + "mcap_test bash -c '" + app("controller") + "z_sine --no-menu & c=$!; " +
+         app("plant") + "z_sine & p=$!; " + app("collect") +
+         "--follow --mcap /nonexistent/x.mcap; s=$?; kill $c $p; exit $s'");
+  EXPECT_EQ(follow.status, 2) << follow.text;
+  EXPECT_NE(follow.text.find("/nonexistent/x.mcap"), std::string::npos) << follow.text;
+}
+
+TEST_F(Programs, ALogWithEveryEventTwiceIsARunOnce) {
+  ASSERT_EQ(run("ramp --lockstep --no-plots" + out("a")).status, 0);
+  const std::string once = (folder_ / "a/run.lcmlog").string(),
+                    twice = (folder_ / "twice.lcmlog").string();
+  {
+    LogReader reader(once);
+    LogWriter writer(twice);
+    LogEvent event;
+    while (reader.next(event))
+      for (int k = 0; k < 2; ++k)
+        writer.write(event.channel, event.data.data(), static_cast<std::int64_t>(event.data.size()),
+                     0);  // by a recorder whose clock stands
+  }
+  const std::string a = (folder_ / "a.csv").string(), b = (folder_ / "b.csv").string();
+  EXPECT_EQ(sh(app("collect") + once + " --out " + a).status, 0);
+  const Output o = sh(app("collect") + twice + " --out " + b);
+  EXPECT_EQ(o.status, 0) << o.text;
+  EXPECT_NE(o.text.find("ticks stand there twice"), std::string::npos) << o.text;
+  EXPECT_EQ(sh("cmp " + a + " " + b).status, 0);
+  // The same messages in MCAP, by the run's own time.
+  const std::string ma = (folder_ / "a.mcap").string(), mb = (folder_ / "b.mcap").string();
+  EXPECT_EQ(sh(app("collect") + once + " --mcap " + ma).status, 0);
+  EXPECT_EQ(sh(app("collect") + twice + " --mcap " + mb).status, 0);
+  EXPECT_EQ(fs::file_size(ma), fs::file_size(mb));
+}
+
 }  // namespace
 }  // namespace ves

@@ -113,6 +113,17 @@ TEST_F(ReceiverOnABus, HearsWhatLcmSaysWholeAndInParts) {
   }
 }
 
+TEST_F(ReceiverOnABus, TakesNoMoreOfAChannelThanItMayHave) {
+  lcm::LCM lcm("udpm://239.255.76.67:7667?ttl=0");
+  receiver_.hear("SHORT", 4096);
+  const std::string fits(4096, 'a'), longer(4097, 'b'), parts(1'000'000, 'c');
+  for (const std::string& data : {parts, longer, fits})
+    lcm.publish("SHORT", data.data(), static_cast<unsigned>(data.size()));
+  const std::vector<std::string> all = heard();
+  ASSERT_EQ(all.size(), 1u);
+  EXPECT_TRUE(all[0] == "SHORT:" + fits);
+}
+
 TEST_F(ReceiverOnABus, NamesOfEveryLengthAreTheirOwn) {
   lcm::LCM lcm("udpm://239.255.76.67:7667?ttl=0");
   std::vector<std::string> names, expected;

@@ -13,6 +13,7 @@ namespace {
 
 using test::experiment;
 using test::kNan;
+using test::segment;
 
 /// A controller on a machine that goes exactly where it is told, at once.
 class Bench {
@@ -234,6 +235,43 @@ TEST(TestPlatform, NoJointAngleEverReachesACommandAsNan) {
         ASSERT_EQ(state.command.counts, before.command.counts) << moment;
       }
     }
+  }
+}
+
+TEST(TestPlatform, AfterALongStallItLetsGoOfLegsThatWentHomeAlone) {
+  // z_sine's platform, raised; its legs have patience for a second and take two to go home.
+  const Experiment e = experiment("z_sine", {"legs.watchdog.park_after_s=1",
+                                             "legs.watchdog.park_time_s=2"});
+  for (const int missed : {50, 98, 99, 400}) {
+    test::Rig rig(e);
+    rig.arm();
+    Segment up = segment(SegmentKind::kMove);
+    up.target.p.z() = 0.1;
+    rig.order(Request::kRun, up);
+    rig.until(Phase::kArmed);
+    rig.run(100);
+    const Vec6 raised = rig.state().legs.L;
+    rig.in().tick += missed;
+    rig.plant().advance(rig.in().tick * test::kTick);
+    rig.plant().sample();
+    const Vec6 found = rig.plant().truth().legs.L;
+    const bool alone = missed + 1 >= 100;
+    EXPECT_EQ((found - raised).norm() > 1e-3, missed == 400) << missed;
+    rig.tick();
+    EXPECT_EQ(rig.state().latched.has(Check::kLeftAlone), alone) << missed;
+    rig.run(200);
+    EXPECT_EQ(rig.state().phase, Phase::kStopped);
+    EXPECT_EQ(rig.state().command.engaged, !alone) << missed;
+    // Nothing leaps: they stay where they were found.
+    rig.plant().sample();
+    const Vec6 moved = rig.plant().truth().legs.L - (alone ? found : raised);
+    EXPECT_LT(moved.cwiseAbs().maxCoeff(), 1e-3) << missed;
+    rig.tick(Request::kReset);
+    rig.arm();
+    rig.run(50);
+    rig.plant().sample();
+    EXPECT_EQ(rig.state().phase, Phase::kArmed);
+    EXPECT_LT((rig.plant().truth().legs.L - (alone ? found : raised)).cwiseAbs().maxCoeff(), 1e-3);
   }
 }
 

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <random>
 
+#include "support/ether.hpp"
 #include "support/refusal.hpp"
 #include "ves/config/document.hpp"
 #include "ves/realtime/realtime.hpp"
@@ -164,6 +165,87 @@ TEST(Decode, TakesExactlyOneMessage) {
   bytes[0] = static_cast<std::uint8_t>(bytes[0] ^ 1);  // of another version
   EXPECT_FALSE(decode<sample_t>(bytes.data(), n));
   EXPECT_FALSE(decode<leg_command_t>(bytes.data(), n));
+}
+
+// --- Links, on a bus in memory -------------------------------------------------------------------
+
+/// Two hosts, nothing late and nothing lost.
+struct InMemory {
+  InMemory() {
+    ether.fate = [](const std::string&) { return test::Ether::Fate{}; };
+  }
+  test::Ether ether;
+  Bus here{std::make_unique<test::MemoryWire>(ether, 0)}, there{std::make_unique<test::MemoryWire>(ether, 0)};
+};
+
+TEST(Link, AHoldOvertakesWhatWaitsAndAllOfItIsAnswered) {
+  for (const Request at_once : {Request::kHold, Request::kStop}) {
+    InMemory bus;
+    ControllerLink link(bus.here, {9, 9});
+    std::int64_t sequence = 0;
+    const auto give = [&](Request request) {
+      bus.there.publish(channel::kOperator,
+                        toMessage({request, {}, {}}, 9, header({5, 1}, sequence++, 0)));
+    };
+    give(Request::kArm);
+    give(Request::kTare);
+    give(at_once);
+    bus.here.drain();
+    const Order first = link.takeOrder();
+    EXPECT_EQ(first.request, at_once);
+    EXPECT_EQ(first.id.sequence, 2);
+    for (const std::int64_t overtaken : {0, 1}) {
+      const Order order = link.takeOrder();
+      EXPECT_EQ(order.request, Request::kOvertaken);
+      EXPECT_EQ(order.id.sequence, overtaken);
+    }
+    EXPECT_EQ(link.takeOrder().request, Request::kNone);
+  }
+}
+
+TEST(Link, AHoldFindsRoomWhereTheQueueIsFull) {
+  InMemory bus;
+  ControllerLink link(bus.here, {9, 9});
+  for (std::int64_t sequence = 0; sequence < 40; ++sequence)
+    bus.there.publish(channel::kOperator, toMessage({Request::kTare, {}, {}}, 9,
+                                                    header({5, 1}, sequence, 0)));
+  bus.there.publish(channel::kOperator,
+                    toMessage({Request::kHold, {}, {}}, 9, header({5, 1}, 40, 0)));
+  bus.here.drain();
+  EXPECT_EQ(link.takeOrder().request, Request::kHold);
+  int waited = 0;
+  while (link.takeOrder().request == Request::kOvertaken) ++waited;
+  EXPECT_EQ(waited, 16);
+}
+
+TEST(Link, NobodyFillsAMachinesMemoryWithOrdersToItsRobot) {
+  InMemory bus;
+  PlantLink link(bus.here, Identity{1, 1});
+  for (int k = 0; k < 1000; ++k)
+    bus.there.publish(channel::kRobot, toMessage(RobotOrder(RobotMove{0, 0.1, 1.0}), header({5, 1}, k, 0)));
+  bus.here.drain();
+  EXPECT_EQ(link.takeRobotOrders().size(), PlantLink::kRobotOrders);
+  EXPECT_EQ(link.rejected(), 1000 - static_cast<std::int64_t>(PlantLink::kRobotOrders));
+}
+
+TEST(Bus, WhatAHandlerThrowsComesUpInTheLoopThatReads) {
+  InMemory bus;
+  int heard = 0;
+  bus.here.subscribe({channel::kTiming}, [&](const std::string&, const void*, std::uint32_t) {
+    ++heard;
+    throw InputError("the disk is full");
+  });
+  for (int k = 0; k < 3; ++k) bus.there.publish(channel::kTiming, timing_t{});
+  bus.here.drain();
+  EXPECT_EQ(heard, 3);  // one that throws keeps nothing from the others
+  EXPECT_THROW(bus.here.rethrow(), InputError);
+  EXPECT_NO_THROW(bus.here.rethrow());
+}
+
+TEST(Bus, WhoOnlySpeaksWaitsForNothing) {
+  InMemory bus;
+  EXPECT_FALSE(bus.there.wait(0));
+  EXPECT_FALSE(bus.there.waitAwake(0));
 }
 
 // --- Bus: inside a network of its own ------------------------------------------------------------

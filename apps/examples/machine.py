@@ -54,7 +54,7 @@ class Machine:
     def __init__(self, rate, url, piece):
         self.period, self.channel = 1.0 / rate, "VES_" + CHANNELS[piece]
         self.bus = lcm.LCM(url)
-        self.setup = self.command = self.hardware = None
+        self.setup = self.command = self.engaged = self.rest = self.hardware = None
         self.heard = self.sequence = 0  # [ns] when the command came; [-] of our messages
         self.source, self.epoch = random.getrandbits(62), time.time_ns()
         self.bus.subscribe("VES_SETUP", self.on_setup)
@@ -78,18 +78,22 @@ class Machine:
         taken = old and old.engaged and time.monotonic_ns() - self.heard < SILENCE
         if old and not same and (taken or new.header.epoch < old.header.epoch):
             return  # somebody else while the legs are taken, or a ghost
+        if new.engaged:
+            self.engaged, self.rest = new, new.rest
+        elif self.engaged:  # somebody is there, and asks for nothing: they stay where they were led
+            self.rest = self.reference() if time.monotonic_ns() - self.heard > self.setup.park_after_ns else self.rest
         self.command, self.heard = new, time.monotonic_ns()
 
     def reference(self):
-        """Of the legs: the command; its `rest` when silence begins, then slowly home; None: stay."""
-        if not self.command or not self.command.engaged:
+        """What the legs follow (docs/machine.md, States); None: they stay."""
+        engaged, home, setup = self.engaged, self.setup.leg_home, self.setup
+        if not engaged:
             return None
         silent = time.monotonic_ns() - self.heard
-        if silent < self.setup.hold_after_ns:
-            return self.command.counts
-        late = silent - self.setup.park_after_ns
-        share = min(1.0, max(0, late) / self.setup.park_time_ns) if self.command.park else 0.0
-        return [r + share * (h - r) for r, h in zip(self.command.rest, self.setup.leg_home)]
+        if self.command.engaged and silent < setup.hold_after_ns:
+            return engaged.counts
+        share = max(0, silent - setup.park_after_ns) / setup.park_time_ns if engaged.park else 0.0
+        return [r + min(1.0, share) * (h - r) for r, h in zip(self.rest, home)]
 
     def sample(self):
         last = self.command.header if self.command else header_t()

@@ -11,7 +11,6 @@
 #include "channel.hpp"
 #include "ves/math/dense.hpp"
 #include "ves/math/second_order.hpp"
-#include "ves/plant/nominal_servo.hpp"
 
 namespace ves {
 namespace {
@@ -160,17 +159,6 @@ Loop loopOf(const ControllerConfig& controller, const plant::PlantConfig& p, con
   loop.base = controller.admittance;
   loop.robot_P = lockedRobot(controller, q);
   loop.period = static_cast<double>(controller.period) * kSecondPerNanosecond;
-  const double extend = p.actuator.gain_extend, retract = p.actuator.gain_retract;
-  double K = 2.0 * extend * retract / (extend + retract);
-  if (direction == Direction::kExtending) K = extend;
-  if (direction == Direction::kRetracting) K = retract;
-  loop.velocity_gain = plant::velocityGain(K, p.leg_slave, p.transducer);
-  loop.derivative_gain = loop.velocity_gain * p.leg_slave.K_D / p.leg_slave.K_P;
-  loop.tau = p.actuator.tau;
-  loop.filter_cutoff = p.filters == plant::LegFilters::kOutputs ? p.filter_cutoff : 0.0;
-  loop.sensor_cutoff = p.sensor.cutoff;
-  loop.readings = p.sensor_readings;
-
   Loop::Model& own = loop.model;
   own = {controller.compensation.feed_forward, controller.compensation.inertia, loop.robot_P,
          controller.servo};
@@ -182,6 +170,15 @@ Loop loopOf(const ControllerConfig& controller, const plant::PlantConfig& p, con
   own.servo.tau.setConstant(own.servo.tau.mean());
   own.servo.delay.setConstant(own.servo.delay.mean());
   own.servo.rail = HUGE_VAL;
+
+  // The machine as it is believed: what the simulated one truly is, nobody can look up.
+  constexpr double kSpan = 4.0;  // [-] updates that X(k) - X(k-4) goes over
+  loop.velocity_gain = model;
+  loop.derivative_gain = model * own.servo.derivative / (kSpan * own.servo.update);
+  loop.tau = own.servo.tau(0);
+  loop.sensor_cutoff = own.servo.sensor_cutoff;
+  loop.filter_cutoff = p.filters == plant::LegFilters::kOutputs ? p.filter_cutoff : 0.0;
+  loop.readings = p.sensor_readings;
   return loop;
 }
 

@@ -42,8 +42,8 @@ FaultOutcome refusals(const Tries& tries) {
                  fmt::format("{} of {} refused, the first with '{}'", refused, tries.size(), line));
 }
 
-FaultOutcome hostileStrings(const fs::path& config) {
-  const Bytes good = encoded(describe(faultScenario(config, "puma_on_table_4_1", {}), {1, 2}, 0));
+FaultOutcome hostileStrings(const FaultBench& bench) {
+  const Bytes good = encoded(describe(faultScenario(own(bench)), {1, 2}, 0));
   constexpr std::size_t kFirstLength = 60;  // [B] after fingerprint, header and schema
   int taken = 0, tries = 0;
   for (const std::uint32_t length : {0x7fffffffu, 0xffffffffu, 0u, 0x40000000u}) {
@@ -96,20 +96,20 @@ FaultOutcome damagedLogs() {
   return out;
 }
 
-FaultOutcome wrongConfigurations(const fs::path& config) {
+FaultOutcome wrongConfigurations(const FaultBench& bench) {
   Tries tries;
   for (const char* set :
        {"legs.tau_s=nan", "legs.tau_s=-1", "controller.period_ns=0", "nonsense=1",
         "base.mass_diagonal=[1,1,1,1,1,-1]", "robot.joints_deg_or_m=[0]", "program=[]",
         "safety.leg_min_m=inf", "sensor.gain=[0,0,0,0,0,0]", "seed=x", "gravity_m_per_s2={}"})
-    tries.push_back([=] { faultScenario(config, "puma_on_table_4_1", {set}); });
+    tries.push_back([=] { faultScenario(own(bench), {set}); });
   tries.push_back([] { loadExperiment("/no/such/file.yaml"); });
   tries.push_back([] { parseDocument("a: [", "x.yaml"); });
   return refusals(tries);
 }
 
-FaultOutcome fullDisk(const fs::path& config) {
-  const Experiment e = faultScenario(config, "puma_on_table_4_1", {});
+FaultOutcome fullDisk(const FaultBench& bench) {
+  const Experiment e = faultScenario(own(bench));
   LogWriter log("/dev/full");
   const RunResult with = runLockstep(e, &log, nullptr), without = runLockstep(e, nullptr, nullptr);
   return outcome(with.good() && with.log_lost > 0 && with.ticks == without.ticks,
@@ -119,16 +119,16 @@ FaultOutcome fullDisk(const fs::path& config) {
 
 }  // namespace
 
-std::vector<FaultRow> inputRows(const fs::path& config) {
+std::vector<FaultRow> inputRows(const FaultBench& bench) {
   return {{"F22", "strings of hostile length in a message", "not decoded", false,
-           [=] { return hostileStrings(config); }},
+           [=] { return hostileStrings(bench); }},
           {"F23", "a message of another version", "not decoded", false, otherVersion},
           {"F24", "logs that are empty, cut short, out of step, absurd, or a folder",
            "one line with the byte", false, damagedLogs},
           {"F25", "configurations that are wrong", "one line with file and line", false,
-           [=] { return wrongConfigurations(config); }},
+           [=] { return wrongConfigurations(bench); }},
           {"F35", "the disk is full", "control unaffected, loss counted", false,
-           [=] { return fullDisk(config); }}};
+           [=] { return fullDisk(bench); }}};
 }
 
 }  // namespace ves

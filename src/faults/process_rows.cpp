@@ -165,7 +165,8 @@ FaultOutcome processorsHogged(const fs::path& config, const fs::path& program) {
 
 }  // namespace
 
-std::vector<FaultRow> processRows(const fs::path& config, const fs::path& program) {
+std::vector<FaultRow> processRows(const FaultBench& bench) {
+  const fs::path &config = bench.config, &program = bench.program;
   // Another moment at each call, the same ones in each run.
   const auto moments = std::make_shared<std::mt19937>(15);
   return {{"F14", "the machine's process is killed", "controlled stop: sample age", true,

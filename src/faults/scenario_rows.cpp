@@ -2,6 +2,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <regex>
 
 #include "rows.hpp"
 #include "ves/run/run.hpp"
@@ -51,6 +52,19 @@ Expectation readExpectation(Section s) {
   return out;
 }
 
+/// "0.2*m" and "15*a" in the unit's size of this platform.
+std::string scaled(const std::string& text, const WorkspaceScale& scale) {
+  static const std::regex kNumber("(-?[0-9.]+)\\*([ma])");
+  std::string out;
+  auto rest = text.cbegin();
+  for (std::sregex_iterator at(text.begin(), text.end(), kNumber), end; at != end; ++at) {
+    out.append(rest, (*at)[0].first);
+    out += fmt::format("{}", std::stod((*at)[1]) * ((*at)[2] == "m" ? scale.lengths : scale.angles));
+    rest = (*at)[0].second;
+  }
+  return out.append(rest, text.cend());
+}
+
 FaultOutcome run(const Experiment& e, const Expectation& expected) {
   FaultOutcome out;
   out.period = e.controller.periodSeconds();
@@ -90,16 +104,19 @@ FaultOutcome run(const Experiment& e, const Expectation& expected) {
 
 }  // namespace
 
-Experiment faultScenario(const fs::path& config, const std::string& name, const Sets& sets) {
-  Experiment e = loadExperiment(config / "scenarios" / (name + ".yaml"), sets);
+Experiment faultScenario(const FaultBench& bench, const Sets& sets) {
+  Sets all = bench.sets;
+  all.insert(all.end(), sets.begin(), sets.end());
+  Experiment e = loadExperiment(findScenario(bench.scenario, bench.config), all);
   if (wantsAdmittance(e.controller.program)) applyStabilityCheck(e);
   return e;
 }
 
-std::vector<FaultRow> scenarioRows(const fs::path& config) {
-  const Value document = loadDocument(config / "faults.yaml");
+std::vector<FaultRow> scenarioRows(const FaultBench& bench) {
+  const Value document = loadDocument(bench.config / "faults.yaml");
   Section root(document, "");
-  const std::string scenario = root.text("scenario");
+  const WorkspaceScale scale(
+      loadExperiment(findScenario(bench.scenario, bench.config), bench.sets).controller.safety, bench);
   Section segments = root.section("segments");
   std::vector<FaultRow> rows;
   for (Section s : root.list("rows")) {
@@ -110,14 +127,16 @@ std::vector<FaultRow> scenarioRows(const fs::path& config) {
     Sets sets;
     if (s.has("in"))
       sets.push_back(fmt::format(
-          "program=[{{calibration: {{}}}}, {{move: {{to: {{x_m: 0.02}}, duration_s: 1}}}}, {{{}, "
+          "program=[{{calibration: {{}}}}, {{move: {{to: {{x_m: {}}}, duration_s: 1}}}}, {{{}, "
           "faults: [{}]}}]",
-          segments.text(s.text("in")), fmt::join(s.texts("inject"), ", ")));
+          0.02 * scale.lengths, scaled(segments.text(s.text("in")), scale),
+          fmt::join(s.texts("inject"), ", ")));
+    row.any_machine = !s.has("set") && !(s.has("own") && s.flag("own"));
     if (s.has("set"))
       for (const std::string& set : s.texts("set")) sets.push_back(set);
     const Expectation expected = readExpectation(s.section("expect"));
     s.finish();
-    row.run = [=] { return run(faultScenario(config, scenario, sets), expected); };
+    row.run = [=] { return run(faultScenario(bench, sets), expected); };
     rows.push_back(row);
   }
   root.finish();

@@ -65,8 +65,8 @@ struct Ending {
   RdtStream::Counters counters;
 };
 
-Ending run(const fs::path& config, const Spoil& spoil) {
-  const Experiment e = faultScenario(config, "puma_on_table_4_1", {});
+Ending run(const FaultBench& bench, const Spoil& spoil) {
+  const Experiment e = faultScenario(own(bench));
   Lockstep loop(e.controller, e.plant);
   Path path(e, spoil);
   std::int64_t emulating = 0, injected = -1;
@@ -102,8 +102,8 @@ FaultOutcome stops(const Ending& e, Check check, std::int64_t within) {
 }
 
 /// Over real sockets: the driver's own thread is to see it.
-FaultOutcome otherCalibration(const fs::path& config) {
-  const Experiment e = faultScenario(config, "puma_on_table_4_1", {});
+FaultOutcome otherCalibration(const FaultBench& bench) {
+  const Experiment e = faultScenario(own(bench));
   devices::NetFtServer::Options options{"127.0.0.1", 0, 0, 1000, kCalibration};
   devices::NetFtServer server(options);
   std::atomic<bool> changed{false};
@@ -128,7 +128,7 @@ FaultOutcome otherCalibration(const fs::path& config) {
   const bool before = faulty(1);
   changed = true;
   const bool after = faulty(kTake);
-  const Ending end = run(config, [](RdtRecord r, bool fault) {
+  const Ending end = run(bench, [](RdtRecord r, bool fault) {
     if (fault) r.status = 0x80000000;
     return std::vector{r};
   });
@@ -140,12 +140,12 @@ FaultOutcome otherCalibration(const fs::path& config) {
 
 }  // namespace
 
-std::vector<FaultRow> sensorRows(const fs::path& config) {
+std::vector<FaultRow> sensorRows(const FaultBench& bench) {
   using Records = std::vector<RdtRecord>;
   return {
       {"F40", "Net F/T: every third record is lost", "the run goes on", false,
        [=] {
-         const Ending e = run(config, [](const RdtRecord& r, bool fault) {
+         const Ending e = run(bench, [](const RdtRecord& r, bool fault) {
            return fault && r.sequence % 3 == 0 ? Records() : Records{r};
          });
          return goesOn(e, e.counters.lost > 3000);
@@ -153,7 +153,7 @@ std::vector<FaultRow> sensorRows(const fs::path& config) {
       {"F41", "Net F/T: records twice, and each older one again", "the run goes on with the newest",
        false,
        [=] {
-         const Ending e = run(config, [](const RdtRecord& r, bool fault) {
+         const Ending e = run(bench, [](const RdtRecord& r, bool fault) {
            if (!fault) return Records{r};
            RdtRecord old = r;
            old.sequence -= 7;
@@ -166,7 +166,7 @@ std::vector<FaultRow> sensorRows(const fs::path& config) {
        [=] {
          bool wrapped = false;
          std::uint32_t last = 0;
-         const Ending e = run(config, [&](const RdtRecord& r, bool fault) {
+         const Ending e = run(bench, [&](const RdtRecord& r, bool fault) {
            wrapped = wrapped || (fault && r.sequence < last);
            last = r.sequence;
            return Records{r};
@@ -175,7 +175,7 @@ std::vector<FaultRow> sensorRows(const fs::path& config) {
        }},
       {"F43", "Net F/T: its status says an error", "controlled stop: device fault", false,
        [=] {
-         return stops(run(config,
+         return stops(run(bench,
                           [](RdtRecord r, bool fault) {
                             if (fault) r.status = 0x80020000;
                             return Records{r};
@@ -185,16 +185,16 @@ std::vector<FaultRow> sensorRows(const fs::path& config) {
       {"F44", "Net F/T: silent", "controlled stop: sample age", false,
        [=] {
          const int most =
-             faultScenario(config, "puma_on_table_4_1", {}).controller.safety.stale_ticks;
-         return stops(run(config, [](const RdtRecord& r,
+             faultScenario(own(bench)).controller.safety.stale_ticks;
+         return stops(run(bench, [](const RdtRecord& r,
                                      bool fault) { return fault ? Records() : Records{r}; }),
                       Check::kStale, most + 1);
        }},
       {"F45", "Net F/T: switched off and on, counts from one", "controlled stop: sample age", false,
        [=] {
          const int most =
-             faultScenario(config, "puma_on_table_4_1", {}).controller.safety.stale_ticks;
-         return stops(run(config,
+             faultScenario(own(bench)).controller.safety.stale_ticks;
+         return stops(run(bench,
                           [&](RdtRecord r, bool fault) {
                             if (fault) r.sequence -= 1'000'000;
                             return Records{r};
@@ -202,7 +202,7 @@ std::vector<FaultRow> sensorRows(const fs::path& config) {
                       Check::kStale, most + 1);
        }},
       {"F46", "Net F/T: another calibration was chosen", "controlled stop: device fault", false,
-       [=] { return otherCalibration(config); }}};
+       [=] { return otherCalibration(bench); }}};
 }
 
 }  // namespace ves

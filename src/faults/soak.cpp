@@ -81,7 +81,9 @@ class Laws {
   std::string broken(const LegCommand& command) {
     std::string what;
     if (command.engaged) {
-      const Vec6 L = legLengths(codec_, command.counts);
+      const Vec6 told = legLengths(codec_, command.counts), L = legLengths(codec_, command.rest);
+      if (!(told.minCoeff() >= limits_.leg_min - count_ && told.maxCoeff() <= limits_.leg_max + count_))
+        what = "a leg told to go outside its limits";
       if (!(L.minCoeff() >= limits_.leg_min - count_ && L.maxCoeff() <= limits_.leg_max + count_))
         what = "a leg outside its limits";
       const double step = (L - last_).cwiseAbs().maxCoeff();
@@ -104,11 +106,10 @@ class Laws {
 
 }  // namespace
 
-SoakResult soak(const std::filesystem::path& config, std::int64_t ticks, std::uint32_t seed,
+SoakResult soak(const Experiment& experiment, std::int64_t ticks, std::uint32_t seed,
                 const std::function<void(std::int64_t)>& progress) {
-  Experiment e = loadExperiment(config / "scenarios" / "puma_on_table_4_1.yaml",
-                                {fmt::format("seed={}", seed)});
-  applyStabilityCheck(e);
+  Experiment e = experiment;
+  e.plant.seed = seed;
   Dice dice(seed);
   Laws laws(e);
   Lockstep loop(e.controller, e.plant);

@@ -20,11 +20,10 @@ bool before(const FaultRow& a, const FaultRow& b) {
 
 }  // namespace
 
-std::vector<FaultRow> faultTable(const std::filesystem::path& config,
-                                 const std::filesystem::path& program) {
+std::vector<FaultRow> faultTable(const FaultBench& bench) {
   std::vector<FaultRow> rows;
-  for (auto& part : {scenarioRows(config), operatorRows(config), inputRows(config),
-                     sensorRows(config), processRows(config, program)})
+  for (auto& part : {scenarioRows(bench), operatorRows(bench), inputRows(bench), sensorRows(bench),
+                     processRows(bench)})
     rows.insert(rows.end(), part.begin(), part.end());
   std::sort(rows.begin(), rows.end(), before);
   return rows;

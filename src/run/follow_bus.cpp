@@ -21,8 +21,8 @@ bool followBus(const std::string& url, const std::function<bool()>& stop,
                   const auto m = decode<experiment_t>(data, size);
                   if (!m || described || !controller || m->header.source != controller->source)
                     return;
-                  described = true;
                   begin(*m);
+                  described = true;
                 });
   bus.subscribe(channel::kRecorded,
                 [&](const std::string& from, const void* data, std::uint32_t size) {

@@ -22,6 +22,14 @@ double limit(const Braking& braking, int i) {
   return i < 3 ? braking.translation : braking.rotation;
 }
 
+/// [-] Of tau x'' + x' = K (r - x), K a quarter more than believed and a LegSlave's update late.
+double overshootOfAStep(const ServoModel& servo) {
+  const double tau = servo.tau.maxCoeff() + servo.update,
+               K = 1.25 * std::max(servo.extend.maxCoeff(), servo.retract.maxCoeff()),
+               under = 4.0 * K * tau - 1.0;
+  return under > 0.0 ? std::exp(-M_PI / std::sqrt(under)) : 0.0;
+}
+
 }  // namespace
 
 Laws::Laws(const Experiment& experiment, const std::string& only)
@@ -268,8 +276,9 @@ void Laws::follow(std::int64_t time, const plant::Truth& truth, const Taken& tak
   if (stopped && !frozen_) {
     frozen_time_ = time;
     const Vec6 from = truth.legs.L - anchor_;
-    const Vec6 overshoot =
-        Vec6::Constant(2.0 * count_) + 0.010 * truth.legs.L_dot.cwiseAbs();
+    // The servo's own: of a speed that it has to lose, and of a step that it has to make.
+    const Vec6 overshoot = Vec6::Constant(2.0 * count_) + 0.010 * truth.legs.L_dot.cwiseAbs() +
+                           overshootOfAStep(c_.servo) * from.cwiseAbs();
     frozen_low_ = from.cwiseMin(0.0) - overshoot;
     frozen_high_ = from.cwiseMax(0.0) + overshoot;
   }

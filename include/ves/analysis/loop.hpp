@@ -82,7 +82,9 @@ enum class Direction { kExtending, kRetracting, kSwinging };
 /// The robot as the controller believes it, its joints locked at q.
 RigidBody lockedRobot(const ControllerConfig& controller, const JointVector& q);
 
-/// The loop of an experiment, the robot as the controller believes it, its joints at q.
+/// The loop of an experiment as its controller believes the machine: servos and sensor by its servo
+/// model, the robot by its payload, the joints at q. Of `plant` it takes what both are told: the
+/// program's robot, how many readings make a mean, whether Filters 1 to 3 are there.
 Loop loopOf(const ControllerConfig& controller, const plant::PlantConfig& plant,
             const JointVector& q, Direction direction);
 

@@ -5,9 +5,10 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <functional>
 #include <string>
+
+#include "ves/config/experiment.hpp"
 
 namespace ves {
 
@@ -20,8 +21,8 @@ struct SoakResult {
   std::string violated;         // a law that a command broke; empty
 };
 
-/// So many ticks of the PUMA on Table 4.1, the same for one seed; `progress` is told the ticks.
-SoakResult soak(const std::filesystem::path& config, std::int64_t ticks, std::uint32_t seed,
+/// So many ticks of an experiment, the same for one seed; `progress` is told the ticks.
+SoakResult soak(const Experiment& experiment, std::int64_t ticks, std::uint32_t seed,
                 const std::function<void(std::int64_t)>& progress);
 
 }  // namespace ves

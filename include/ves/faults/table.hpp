@@ -26,12 +26,20 @@ struct FaultRow {
   std::string expected;
   bool processes = false;  // runs real processes, in real time
   std::function<FaultOutcome()> run;
+  bool any_machine = false;  // the same is expected of any robot, base and platform
 };
 
-/// `config` is the folder with faults.yaml and the scenarios; `program` is `ves`, which is the
-/// controller and the plant of rows with processes. Those need a bus: enterPrivateBus() first.
-/// Throws InputError where faults.yaml is wrong.
-std::vector<FaultRow> faultTable(const std::filesystem::path& config,
-                                 const std::filesystem::path& program);
+/// What the table is run on.
+struct FaultBench {
+  std::filesystem::path config;                // the folder with faults.yaml and the scenarios
+  std::string scenario = "puma_on_table_4_1";  // a name in it, or a file
+  std::vector<std::string> sets;               // for every row, as for --set
+  double amplitude = 1.0;                      // [-] times the table's motions
+  std::filesystem::path program;  // `ves`: the controller and the plant of rows with processes
+};
+
+/// Rows with processes need a bus: enterPrivateBus() first. Throws InputError where faults.yaml, the
+/// scenario or a setting is wrong.
+std::vector<FaultRow> faultTable(const FaultBench& bench);
 
 }  // namespace ves

@@ -29,5 +29,10 @@ class Broken(machine.Machine):
             m.legs[1], m.legs[4] = m.legs[4], m.legs[1]
         return m
 
+    def reference(self):
+        if self.what == "keeps its reference" and self.engaged:
+            return self.engaged.counts
+        return super().reference()
+
 
 Broken(sys.argv[1]).run()
