@@ -64,7 +64,6 @@ class Run:
         def prepare():
             for what, value in (limits or {}).items():
                 resource.setrlimit(what, (value, value))
-            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         with tempfile.TemporaryFile() as err:
             process = subprocess.Popen([str(VES), *arguments], cwd=folder, stdin=subprocess.DEVNULL,
                                        stdout=stdout if stdout != subprocess.PIPE else subprocess.DEVNULL,
