@@ -214,6 +214,7 @@ class World {
       c.log = std::make_unique<LogWriter>(std::make_unique<MemoryDisk>(c.file, disk_full_));
       c.log->write(channel::kExperiment, describe(e_, c.id, 0), 0);
       c.log->flush();  // what the disk has no room for later does not matter to it
+      c.spoilt = disk_full_;
       c.bus.subscribe({channel::kSample, channel::kOperator},
                       [&c](const std::string& from, const void* data, std::uint32_t size) {
                         c.log->write(from, data, size, c.link.sampleTime());
@@ -277,6 +278,7 @@ class World {
 
   /// What is in a log is whole, and what is whole replays bit for bit.
   void judgeLog(const Controller& c) {
+    if (c.spoilt && c.file.empty()) return;  // there never was room for it
     const std::string file = (scratch_ / fmt::format("{}.lcmlog", life_.seed)).string();
     std::ofstream(file, std::ios::binary)
         .write(reinterpret_cast<const char*>(c.file.data()), static_cast<std::streamsize>(c.file.size()));
