@@ -71,9 +71,9 @@ std::vector<Requirement> move(const Experiment& experiment, const ProcessOptions
 
 /// Follows commands a millimetre ahead of where it is to rest, and then hears no more.
 Requirement silence(const Experiment& experiment, const std::string& url) {
-  constexpr int kTicks = 50;            // [-] of commands
-  constexpr std::int32_t kAhead = 15;   // [count]
-  constexpr double kStill = 2.0;        // [count]
+  constexpr int kTicks = 50;           // [-] of commands
+  constexpr std::int32_t kAhead = 15;  // [count]
+  constexpr double kStill = 2.0;       // [count]
   const std::int64_t period = experiment.controller.period;
   const Identity self = Identity::draw();
   const setup_t setup = setupOf(experiment, false, header(self, 0, 0));
@@ -94,7 +94,8 @@ Requirement silence(const Experiment& experiment, const std::string& url) {
       most = std::max(most, std::abs(static_cast<double>(link.sample().legs[i] - from[i])));
     return most;
   };
-  run({}, static_cast<int>(2 * PlantLink::kSilence / period));  // the last controller's are free now
+  run({},
+      static_cast<int>(2 * PlantLink::kSilence / period));  // the last controller's are free now
   LegCommand command;
   command.engaged = true;
   command.rest = command.counts = link.sample().legs;
@@ -106,8 +107,9 @@ Requirement silence(const Experiment& experiment, const std::string& url) {
   bus.drain();
   const double off = apart(command.rest);
   run({}, 3);
-  return {"silence", fmt::format("rests at `rest` after {:.0f} ms without a command",
-                                 static_cast<double>(setup.hold_after_ns) * 1e-6),
+  return {"silence",
+          fmt::format("rests at `rest` after {:.0f} ms without a command",
+                      static_cast<double>(setup.hold_after_ns) * 1e-6),
           fmt::format("{:.0f} counts from it, of {:.0f} that it was led away", off, followed),
           off <= kStill && followed > 0.5 * kAhead};
 }

@@ -3,8 +3,8 @@
 // ves: every command of the project in one program.
 #include <string_view>
 
-#include "app.hpp"
 #include <csignal>
+#include "app.hpp"
 
 #include "commands.hpp"
 #include "ves/base/build.hpp"

@@ -148,8 +148,8 @@ TEST(JointReaction, JointsThatStandGiveNoneAndAPauseBeginsAnew) {
 TEST(JointReaction, StaysWhereADriverOfTheJointsIsSlowerThanTheTick) {
   for (const bool averaged : {false, true})
     for (const int every : {2, 3}) {  // [-] ticks
-      const ControllerConfig c = pendulum(config(
-          {averaged ? "sensor.readings_per_tick=4" : "sensor.readings_per_tick=1"}));
+      const ControllerConfig c = pendulum(
+          config({averaged ? "sensor.readings_per_tick=4" : "sensor.readings_per_tick=1"}));
       KnownPayload known(c);
       JointReaction joints(c);
       double off = 0.0, most = 0.0;
@@ -160,8 +160,7 @@ TEST(JointReaction, StaysWhereADriverOfTheJointsIsSlowerThanTheTick) {
         s.q(0) = angle(1e-2 * (k / every * every));
         const double F = joints.update(known, s).f(1);
         if (k < 50) continue;
-        const double should =
-            filtered(c.servo.sensor_cutoff, 1e-2 * k, averaged ? 1e-2 : 0.0)(1);
+        const double should = filtered(c.servo.sensor_cutoff, 1e-2 * k, averaged ? 1e-2 : 0.0)(1);
         off = std::max(off, std::abs(F - should));
         most = std::max(most, std::abs(should));
       }

@@ -113,8 +113,7 @@ TEST(AfterAdmittance, TheMotionGoesOnWhereAndWhenItWas) {
         const double a = 1.5 * on.e.controller.stop_braking.translation + 15.0 * speed;  // [m/s^2]
         double rate = before.motion.x_dot(0);  // at the instant of `desired`, to a period
         double worst = 0.0;                    // [m] tracking
-        if (then == Request::kNone)
-          on.rig.disturb([](Sample& s) { s.adc[kWrenchChannels] = 0; });
+        if (then == Request::kNone) on.rig.disturb([](Sample& s) { s.adc[kWrenchChannels] = 0; });
         on.rig.tick(then);
         for (int n = 0; n < 60; ++n) {
           const TickState& s = on.rig.state();

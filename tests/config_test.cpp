@@ -494,10 +494,11 @@ TEST(Config, TheOldNameOfPlantMismatchDoesNotApplyTwice) {
 
 TEST(Config, LoadsAreToldInTheOrderOfTheirTimes) {
   // Released after it was grasped, and told sooner.
-  const Experiment e = loadExperiment(
-      test::configDir() + "/scenarios/puma_on_table_4_1.yaml",
-      {"program=[{admittance: {duration_s: 14}, robot: [{at_s: 1, grasp: {mass_kg: 2, center_m: [0, 0, 0], "
-       "inertia_kg_m2: [0.01, 0.01, 0.01, 0, 0, 0], told_after_s: 5}}, {at_s: 3, release: {told_after_s: 0.5}}]}]"});
+  const Experiment e = loadExperiment(test::configDir() + "/scenarios/puma_on_table_4_1.yaml",
+                                      {"program=[{admittance: {duration_s: 14}, robot: [{at_s: 1, "
+                                       "grasp: {mass_kg: 2, center_m: [0, 0, 0], "
+                                       "inertia_kg_m2: [0.01, 0.01, 0.01, 0, 0, 0], told_after_s: "
+                                       "5}}, {at_s: 3, release: {told_after_s: 0.5}}]}]"});
   const ToldLoads& told = e.controller.told_loads;
   ASSERT_EQ(told.size, 2);
   EXPECT_EQ(told.loads[0].cue.after, 3'500'000'000);

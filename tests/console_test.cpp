@@ -344,9 +344,9 @@ TEST_F(Console, AStopComesHomeAndEndsTheSession) {
 }
 
 TEST_F(Console, LinesOfTheMenuMayComeThroughAPipe) {
-  const std::string whole = "cd " + folder_.string() + "; printf 'arm\nmove x 10\nwait 2\nstop\n' | ( " +
-                            app("controller") + "z_sine --plant --private-bus --no-plots " +
-                            patient() + " --out a )";
+  const std::string whole = "cd " + folder_.string() +
+                            "; printf 'arm\nmove x 10\nwait 2\nstop\n' | ( " + app("controller") +
+                            "z_sine --plant --private-bus --no-plots " + patient() + " --out a )";
   const std::string piped = "bash -c \"" + whole + "\"";
   const Output o = sh(piped);
   EXPECT_EQ(o.status, 0) << o.text;
@@ -354,7 +354,8 @@ TEST_F(Console, LinesOfTheMenuMayComeThroughAPipe) {
 }
 
 TEST_F(Console, WhatTheBareProcessCannotDoIsRefused) {
-  for (const char* options : {"--start --out a", "--no-menu --plant", "--start --lockstep --out a"}) {
+  for (const char* options :
+       {"--start --out a", "--no-menu --plant", "--start --lockstep --out a"}) {
     const Output o = sh("cd " + folder_.string() + "; " + app("controller") + "z_sine " + options);
     EXPECT_EQ(o.status, 2) << options << o.text;
     EXPECT_NE(o.text.find("want "), std::string::npos) << o.text;
@@ -365,8 +366,8 @@ TEST_F(Console, WhatTheBareProcessCannotDoIsRefused) {
 TEST_F(Console, AControllerThatMayWriteNoMoreBringsThePlatformHome) {
   // SIGXFSZ ends a process that has not said otherwise, in the middle of the motion.
   const Output o = sh("cd " + folder_.string() + "; ulimit -f 40; " + app("controller") +
-                      "z_sine --lockstep --start --log a.lcmlog & controller=$!; " +
-                      app("plant") + "z_sine --lockstep & wait $controller; status=$?; "
+                      "z_sine --lockstep --start --log a.lcmlog & controller=$!; " + app("plant") +
+                      "z_sine --lockstep & wait $controller; status=$?; "
                       "kill $!; exit $status");
   EXPECT_EQ(o.status, 0) << o.text;
 }

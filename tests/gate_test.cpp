@@ -273,12 +273,12 @@ TEST(Gate, NothingOfTheSimulatedMachineChangesItsVerdict) {
 
 TEST(Gate, LooksAtTheServosThatWereIdentified) {
   Experiment e = test::experiment("puma_on_table_4_1", test::kCompensated);
-  const double nominal = loopOf(e.controller, e.plant, e.plant.initial_joints,
-                                Direction::kExtending).velocity_gain;
+  const double nominal =
+      loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kExtending).velocity_gain;
   e.controller.servo.extend *= 0.75;
-  EXPECT_NEAR(loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kExtending)
-                  .velocity_gain,
-              0.75 * nominal, 1e-12 * nominal);
+  EXPECT_NEAR(
+      loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kExtending).velocity_gain,
+      0.75 * nominal, 1e-12 * nominal);
 }
 
 }  // namespace

@@ -240,8 +240,8 @@ TEST_F(Programs, SecondControllerRefusesToArmAndTheFirstGoesOn) {
 
 TEST_F(Programs, AnMcapFileThatCannotBeWrittenIsOneLine) {
   ASSERT_EQ(run("ramp --lockstep --no-plots" + out("a")).status, 0);
-  const Output log = sh(app("collect") + (folder_ / "a/run.lcmlog").string() +
-                        " --mcap /nonexistent/x.mcap");
+  const Output log =
+      sh(app("collect") + (folder_ / "a/run.lcmlog").string() + " --mcap /nonexistent/x.mcap");
   EXPECT_EQ(log.status, 2) << log.text;
   // Of a run on the bus too: what a callback throws ends in a line, and not the process.
   const Output follow =

@@ -240,8 +240,8 @@ TEST(TestPlatform, NoJointAngleEverReachesACommandAsNan) {
 
 TEST(TestPlatform, AfterALongStallItLetsGoOfLegsThatWentHomeAlone) {
   // z_sine's platform, raised; its legs have patience for a second and take two to go home.
-  const Experiment e = experiment("z_sine", {"legs.watchdog.park_after_s=1",
-                                             "legs.watchdog.park_time_s=2"});
+  const Experiment e =
+      experiment("z_sine", {"legs.watchdog.park_after_s=1", "legs.watchdog.park_time_s=2"});
   for (const int missed : {50, 98, 99, 400}) {
     test::Rig rig(e);
     rig.arm();

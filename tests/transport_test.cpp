@@ -175,7 +175,8 @@ struct InMemory {
     ether.fate = [](const std::string&) { return test::Ether::Fate{}; };
   }
   test::Ether ether;
-  Bus here{std::make_unique<test::MemoryWire>(ether, 0)}, there{std::make_unique<test::MemoryWire>(ether, 0)};
+  Bus here{std::make_unique<test::MemoryWire>(ether, 0)},
+      there{std::make_unique<test::MemoryWire>(ether, 0)};
 };
 
 TEST(Link, AHoldOvertakesWhatWaitsAndAllOfItIsAnswered) {
@@ -207,8 +208,8 @@ TEST(Link, AHoldFindsRoomWhereTheQueueIsFull) {
   InMemory bus;
   ControllerLink link(bus.here, {9, 9});
   for (std::int64_t sequence = 0; sequence < 40; ++sequence)
-    bus.there.publish(channel::kOperator, toMessage({Request::kTare, {}, {}}, 9,
-                                                    header({5, 1}, sequence, 0)));
+    bus.there.publish(channel::kOperator,
+                      toMessage({Request::kTare, {}, {}}, 9, header({5, 1}, sequence, 0)));
   bus.there.publish(channel::kOperator,
                     toMessage({Request::kHold, {}, {}}, 9, header({5, 1}, 40, 0)));
   bus.here.drain();
@@ -222,7 +223,8 @@ TEST(Link, NobodyFillsAMachinesMemoryWithOrdersToItsRobot) {
   InMemory bus;
   PlantLink link(bus.here, Identity{1, 1});
   for (int k = 0; k < 1000; ++k)
-    bus.there.publish(channel::kRobot, toMessage(RobotOrder(RobotMove{0, 0.1, 1.0}), header({5, 1}, k, 0)));
+    bus.there.publish(channel::kRobot,
+                      toMessage(RobotOrder(RobotMove{0, 0.1, 1.0}), header({5, 1}, k, 0)));
   bus.here.drain();
   EXPECT_EQ(link.takeRobotOrders().size(), PlantLink::kRobotOrders);
   EXPECT_EQ(link.rejected(), 1000 - static_cast<std::int64_t>(PlantLink::kRobotOrders));

@@ -27,7 +27,7 @@ Compensation readCompensation(Section& controller) {
   c.inertia = s.flag("inertia");
   if (c.inertia && !c.observer) s.fail("inertia", "needs the observer, want 'observer: true'");
   c.mass_update = static_cast<int>(s.integer("mass_update_ticks", 1, 1'000'000));
-  c.ramp = s.number("ramp_s", 0.01, 100.0);
+  c.ramp = s.number("ramp_s", 0.01, 5.0);  // the gate looks at its two ends
   c.jitter = s.number("reading_jitter_s", 0.0, 0.1);
   c.adaptation = s.flag("adaptation");
   if (c.adaptation && !c.observer)

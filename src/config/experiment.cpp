@@ -119,9 +119,10 @@ Experiment build(const Value& document) {
     c.servo = withRecord(c.servo, record);
     if (const double most = ModelledServos::kMostDelay * c.periodSeconds();
         !(c.servo.delay.maxCoeff() <= most))
-      root.fail("servo", fmt::format("delay_s of {:.4g} s, want at most {:.4g} s: {} periods of the "
-                                     "controller",
-                                     c.servo.delay.maxCoeff(), most, ModelledServos::kMostDelay));
+      root.fail("servo",
+                fmt::format("delay_s of {:.4g} s, want at most {:.4g} s: {} periods of the "
+                            "controller",
+                            c.servo.delay.maxCoeff(), most, ModelledServos::kMostDelay));
     c.compensation = withRecord(c.compensation, record);
   }
   c.safety =
@@ -209,11 +210,10 @@ Experiment build(const Value& document) {
 
   readProgram(root, out);
   ToldLoads& told = c.told_loads;
-  std::stable_sort(told.loads.begin(), told.loads.begin() + told.size,
-                   [](const ToldLoad& a, const ToldLoad& b) {
-                     return std::pair(a.cue.segment, a.cue.after) <
-                            std::pair(b.cue.segment, b.cue.after);
-                   });
+  std::stable_sort(
+      told.loads.begin(), told.loads.begin() + told.size, [](const ToldLoad& a, const ToldLoad& b) {
+        return std::pair(a.cue.segment, a.cue.after) < std::pair(b.cue.segment, b.cue.after);
+      });
   if (p.world) {
     const int segment = admittanceSegment(c.program);
     p.world->release = segment < c.program.size ? segment : -1;

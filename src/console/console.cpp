@@ -288,7 +288,8 @@ class Console {
       }
       if (phase_ == Phase::kStopped) failed_ = true;
       if (phase_ == Phase::kParked) {  // a stop: the controller lets go, and ends
-        for (++i; i < script_.size(); ++i) say("the run is over; left out: " + options_.commands[i]);
+        for (++i; i < script_.size(); ++i)
+          say("the run is over; left out: " + options_.commands[i]);
         return;
       }
     }

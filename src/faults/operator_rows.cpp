@@ -104,9 +104,10 @@ FaultOutcome controllerSilent(Machine loop) {
     fastest = std::max(fastest, loop.plant().truth().legs.L_dot.cwiseAbs().maxCoeff());
   }
   const double away = loop.plant().truth().x.stacked().norm();
-  return outcome(moved < loop.counts && fastest < 0.05 * std::max(1.0, loop.scale.lengths) && away < 1e-3,
-                 fmt::format("held within {:.2f} mm, then home at {:.0f} mm/s, to {:.2f} mm",
-                             moved * kMilli, fastest * kMilli, away * kMilli));
+  return outcome(
+      moved < loop.counts && fastest < 0.05 * std::max(1.0, loop.scale.lengths) && away < 1e-3,
+      fmt::format("held within {:.2f} mm, then home at {:.0f} mm/s, to {:.2f} mm", moved * kMilli,
+                  fastest * kMilli, away * kMilli));
 }
 
 FaultOutcome stall(Machine loop) {
@@ -115,10 +116,9 @@ FaultOutcome stall(Machine loop) {
   loop.input.tick += 50;
   const std::int64_t detected = ticksUntil(loop, stopped);
   const double step = (loop.state().legs.L - L).cwiseAbs().maxCoeff();
-  return outcome(loop.state().cause == Check::kOverrun &&
-                     step <= loop.limits.leg_velocity * loop.tick,
-                 fmt::format("{}; next step {:.1f} mm", name(loop.state().cause), step * kMilli),
-                 detected);
+  return outcome(
+      loop.state().cause == Check::kOverrun && step <= loop.limits.leg_velocity * loop.tick,
+      fmt::format("{}; next step {:.1f} mm", name(loop.state().cause), step * kMilli), detected);
 }
 
 FaultOutcome oneLateTick(Machine loop) {

@@ -59,7 +59,8 @@ std::string scaled(const std::string& text, const WorkspaceScale& scale) {
   auto rest = text.cbegin();
   for (std::sregex_iterator at(text.begin(), text.end(), kNumber), end; at != end; ++at) {
     out.append(rest, (*at)[0].first);
-    out += fmt::format("{}", std::stod((*at)[1]) * ((*at)[2] == "m" ? scale.lengths : scale.angles));
+    out +=
+        fmt::format("{}", std::stod((*at)[1]) * ((*at)[2] == "m" ? scale.lengths : scale.angles));
     rest = (*at)[0].second;
   }
   return out.append(rest, text.cend());
@@ -116,7 +117,8 @@ std::vector<FaultRow> scenarioRows(const FaultBench& bench) {
   const Value document = loadDocument(bench.config / "faults.yaml");
   Section root(document, "");
   const WorkspaceScale scale(
-      loadExperiment(findScenario(bench.scenario, bench.config), bench.sets).controller.safety, bench);
+      loadExperiment(findScenario(bench.scenario, bench.config), bench.sets).controller.safety,
+      bench);
   Section segments = root.section("segments");
   std::vector<FaultRow> rows;
   for (Section s : root.list("rows")) {

@@ -184,16 +184,14 @@ std::vector<FaultRow> sensorRows(const FaultBench& bench) {
        }},
       {"F44", "Net F/T: silent", "controlled stop: sample age", false,
        [=] {
-         const int most =
-             faultScenario(own(bench)).controller.safety.stale_ticks;
+         const int most = faultScenario(own(bench)).controller.safety.stale_ticks;
          return stops(run(bench, [](const RdtRecord& r,
-                                     bool fault) { return fault ? Records() : Records{r}; }),
+                                    bool fault) { return fault ? Records() : Records{r}; }),
                       Check::kStale, most + 1);
        }},
       {"F45", "Net F/T: switched off and on, counts from one", "controlled stop: sample age", false,
        [=] {
-         const int most =
-             faultScenario(own(bench)).controller.safety.stale_ticks;
+         const int most = faultScenario(own(bench)).controller.safety.stale_ticks;
          return stops(run(bench,
                           [&](RdtRecord r, bool fault) {
                             if (fault) r.sequence -= 1'000'000;

@@ -82,7 +82,8 @@ class Laws {
     std::string what;
     if (command.engaged) {
       const Vec6 told = legLengths(codec_, command.counts), L = legLengths(codec_, command.rest);
-      if (!(told.minCoeff() >= limits_.leg_min - count_ && told.maxCoeff() <= limits_.leg_max + count_))
+      if (!(told.minCoeff() >= limits_.leg_min - count_ &&
+            told.maxCoeff() <= limits_.leg_max + count_))
         what = "a leg told to go outside its limits";
       if (!(L.minCoeff() >= limits_.leg_min - count_ && L.maxCoeff() <= limits_.leg_max + count_))
         what = "a leg outside its limits";

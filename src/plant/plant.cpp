@@ -184,8 +184,7 @@ void Plant::moveActuators(std::int64_t to) noexcept {
 
 /// A cue's time has come, and not yet gone.
 bool Plant::now(const Cue& cue, std::int64_t duration) const noexcept {
-  const std::int64_t began =
-      cue.segment < 0 ? 0 : began_[static_cast<std::size_t>(cue.segment)];
+  const std::int64_t began = cue.segment < 0 ? 0 : began_[static_cast<std::size_t>(cue.segment)];
   if (began == kNever || now_ - began < cue.after) return false;
   return now_ - began - cue.after < duration;
 }

@@ -71,8 +71,8 @@ std::string claimRealtime(int priority, bool required) {
   param.sched_priority = priority;
   std::string refused;
   const auto refuse = [&](const char* what) {
-    refused += fmt::format("{}{} refused: {}", refused.empty() ? "" : "; ", what,
-                           std::strerror(errno));
+    refused +=
+        fmt::format("{}{} refused: {}", refused.empty() ? "" : "; ", what, std::strerror(errno));
   };
   // Threads and processes that are begun later have the ordinary priority.
   if (sched_setscheduler(0, SCHED_FIFO | SCHED_RESET_ON_FORK, &param) != 0) refuse("SCHED_FIFO");
@@ -81,8 +81,7 @@ std::string claimRealtime(int priority, bool required) {
   else
     prefaultStack();
   if (required && !refused.empty())
-    throw InputError(
-        fmt::format("--realtime: {} (see ulimit -r and -l, or run as root)", refused));
+    throw InputError(fmt::format("--realtime: {} (see ulimit -r and -l, or run as root)", refused));
   return refused;
 }
 

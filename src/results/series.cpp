@@ -97,7 +97,8 @@ Series readSeries(const std::string& log) {
   }
   if (const auto row = rows.finish()) series.rows.push_back(*row);
   if (twice > 0)
-    series.damage.add(fmt::format("{}: {} ticks stand there twice; each is taken once", log, twice));
+    series.damage.add(
+        fmt::format("{}: {} ticks stand there twice; each is taken once", log, twice));
   if (series.damage.any() && (!configured || series.rows.empty()))
     throw InputError(series.damage.first());
   if (!configured)

@@ -287,8 +287,8 @@ void ControllerLink::receiveSample(const void* data, std::uint32_t size) noexcep
   const auto sample = message ? fromMessage(*message) : std::nullopt;
   const bool answers_us = message && message->command_source == self_.source;
   const bool alive = answers_us || !bus_.keyed();
-  const auto verdict = message ? machine_.judge(message->header, alive, engaged_)
-                               : MachineHeard::Verdict::kAnother;
+  const auto verdict =
+      message ? machine_.judge(message->header, alive, engaged_) : MachineHeard::Verdict::kAnother;
   const bool same = verdict == MachineHeard::Verdict::kSame,
              renewed = verdict == MachineHeard::Verdict::kRenewed;
   if (sample && !same && !renewed && alive) conflict_ = true;
@@ -369,8 +369,7 @@ PlantLink::PlantLink(Bus& bus, const std::optional<Identity>& self) : bus_(bus),
                 [this](const std::string&, const void* data, std::uint32_t size) {
                   const auto message = decode<robot_command_t>(data, size);
                   const auto order = message ? fromMessage(*message) : std::nullopt;
-                  if (!order || !means(message->machine) ||
-                      robot_orders_.size() >= kRobotOrders) {
+                  if (!order || !means(message->machine) || robot_orders_.size() >= kRobotOrders) {
                     ++rejected_;
                     return;
                   }

@@ -65,7 +65,8 @@ void LogWriter::write(const std::string& channel, const void* data, std::int64_t
                       std::int64_t time_ns) noexcept {
   // The buffer has room for all but an experiment_t, which comes first.
   if (waiting_.size() + channel.size() + static_cast<std::size_t>(kHeaderSize + size) >
-      waiting_.capacity()) try {
+      waiting_.capacity())
+    try {
       waiting_.reserve(2 * waiting_.capacity() + static_cast<std::size_t>(size));
     } catch (const std::bad_alloc&) {
       error_ = ENOMEM;

@@ -37,10 +37,10 @@ constexpr double kMaxLoadInertia = 1e7;  // [kg m^2]
 constexpr int kJointOrder = 0, kToolToOrder = 1, kToolByOrder = 2, kGraspOrder = 3,
               kReleaseOrder = 4;
 constexpr int kPositionPart = 1, kRpyPart = 2, kViaPart = 4;
-constexpr double kMaxTime = 1e6;          // [s] of an order
-constexpr double kMaxTranslation = 10.0;  // [m]
-constexpr double kMaxRotation = 10.0;     // [rad]
-constexpr double kMaxFrequency = 1e3;     // [Hz]
+constexpr double kMaxTime = 1e6;                    // [s] of an order
+constexpr double kMaxTranslation = 10.0;            // [m]
+constexpr double kMaxRotation = 10.0;               // [rad]
+constexpr double kMaxFrequency = 1e3;               // [Hz]
 constexpr std::int64_t kMostAhead = 1'000'000'000;  // [ns] the longest period
 
 }  // namespace

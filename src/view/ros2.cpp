@@ -104,8 +104,8 @@ class McapExport::Impl {
   }
 
  private:
-  /// [ns] By the run's own clock, begun at the first event's time: a recorder's wall clock may stand
-  /// at zero, or be set back. Nothing for an event that stands there twice.
+  /// [ns] By the run's own clock, begun at the first event's time: a recorder's wall clock may
+  /// stand at zero, or be set back. Nothing for an event that stands there twice.
   std::optional<std::int64_t> timeOf(const LogEvent& event) {
     if (event.data.size() < kFingerprintSize + kHeaderSize) return event.time_us * 1000;
     const auto field = [&](std::size_t at) {

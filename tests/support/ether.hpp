@@ -77,8 +77,7 @@ class MemoryWire : public Wire {
 inline void Ether::send(const std::string& channel, const void* data, std::size_t size) {
   const Fate f = fate(channel);
   for (int i = 0; i < f.copies; ++i)
-    for (MemoryWire* wire : wires_)
-      wire->take(channel, data, size, now + f.delay * (1 + 3 * i));
+    for (MemoryWire* wire : wires_) wire->take(channel, data, size, now + f.delay * (1 + 3 * i));
 }
 
 }  // namespace ves::test

@@ -122,10 +122,12 @@ void Laws::reference(const TickState& s) {
       }
   }
   if (!((ahead.cwiseAbs() - most).maxCoeff() <= 0.0))
-    broken("reference", fmt::format("{} {}: {} ahead of the checked lengths",
-                                    name(s.phase), name(s.kind), legText(ahead)));
-  const double out = std::max(c_.safety.leg_min - sent.minCoeff(), sent.maxCoeff() - c_.safety.leg_max);
-  if (!(out <= count_)) broken("reference", fmt::format("{:.2f} mm outside a leg's limits", out * 1e3));
+    broken("reference", fmt::format("{} {}: {} ahead of the checked lengths", name(s.phase),
+                                    name(s.kind), legText(ahead)));
+  const double out =
+      std::max(c_.safety.leg_min - sent.minCoeff(), sent.maxCoeff() - c_.safety.leg_max);
+  if (!(out <= count_))
+    broken("reference", fmt::format("{:.2f} mm outside a leg's limits", out * 1e3));
 }
 
 /// The commanded motion goes on from where it was, at the rate that it had.
@@ -153,20 +155,22 @@ void Laws::continuous(const TickState& s) {
   const bool model = b.kind == SegmentKind::kAdmittance && s.desired == b.motion.x;
   for (int i = 0; i < 6; ++i) {
     if (planned(b.kind) && (rate(i) == 0.0 || desired_rate_(i) == 0.0)) continue;
-    const double most = kQuinticBraking * std::max(limit(c_.stop_braking, i), limit(c_.gentle.braking, i)) +
-                        std::abs(s.motion.x_ddot(i)) + std::abs(b.motion.x_ddot(i));
+    const double most =
+        kQuinticBraking * std::max(limit(c_.stop_braking, i), limit(c_.gentle.braking, i)) +
+        std::abs(s.motion.x_ddot(i)) + std::abs(b.motion.x_ddot(i));
     const double step = s.desired(i) - b.desired(i),
                  due = 0.5 * period_ * (rate(i) + desired_rate_(i));
     if (!model && !(std::abs(step - due) <= 0.3 * most * period_ * period_ + 1e-9))
       broken("continuous",
-             fmt::format("{} {} to {} {}: coordinate {} goes {:.3g} where its rates say {:.3g} [m, rad]",
-                         name(b.phase), name(b.kind), name(s.phase), name(s.kind), i, step, due));
+             fmt::format(
+                 "{} {} to {} {}: coordinate {} goes {:.3g} where its rates say {:.3g} [m, rad]",
+                 name(b.phase), name(b.kind), name(s.phase), name(s.kind), i, step, due));
     const double jump = s.motion.x_dot(i) - b.motion.x_dot(i);
     if (planned(s.kind) || s.kind == SegmentKind::kAdmittance) continue;
     if (!(std::abs(jump) <= 1.1 * most * period_ + 1e-9))
-      broken("continuous", fmt::format("{} {} to {} {}: the rate of coordinate {} jumps by {:.3g} [1/s]",
-                                       name(b.phase), name(b.kind), name(s.phase), name(s.kind), i,
-                                       jump));
+      broken("continuous",
+             fmt::format("{} {} to {} {}: the rate of coordinate {} jumps by {:.3g} [1/s]",
+                         name(b.phase), name(b.kind), name(s.phase), name(s.kind), i, jump));
   }
 }
 
@@ -175,8 +179,8 @@ void Laws::orders(const TickState& s) {
   const auto at = orders_.find(s.order.sequence);
   if (at != orders_.end() && s.refusal != Refusal::kChecking) {
     if (at->second.answer && *at->second.answer != s.refusal)
-      broken("orders", fmt::format("an order was answered '{}', then '{}'", name(*at->second.answer),
-                                   name(s.refusal)));
+      broken("orders", fmt::format("an order was answered '{}', then '{}'",
+                                   name(*at->second.answer), name(s.refusal)));
     at->second.answer = s.refusal;
   }
   const auto patience = static_cast<std::int64_t>(1.0 / period_) + 3;
@@ -213,10 +217,14 @@ void Laws::trips(const TickState& s) {
   };
   bool good = false;
   switch (b.phase) {
-    case P::kDisarmed: good = may({P::kArmed, P::kRunning, P::kReturning, P::kStopping, P::kStopped}); break;
+    case P::kDisarmed:
+      good = may({P::kArmed, P::kRunning, P::kReturning, P::kStopping, P::kStopped});
+      break;
     case P::kArmed: good = may({P::kRunning, P::kReturning, P::kStopping, P::kStopped}); break;
     case P::kRunning: good = may({P::kArmed, P::kReturning, P::kStopping, P::kStopped}); break;
-    case P::kReturning: good = may({P::kArmed, P::kRunning, P::kParked, P::kStopping, P::kStopped}); break;
+    case P::kReturning:
+      good = may({P::kArmed, P::kRunning, P::kParked, P::kStopping, P::kStopped});
+      break;
     case P::kParked: good = may({P::kStopping, P::kStopped}); break;
     case P::kStopping: good = may({P::kStopped}); break;
     case P::kStopped: good = may({P::kDisarmed}); break;
@@ -231,13 +239,15 @@ void Laws::permitted(const TickInput& in, const TickState& s) {
   if (asked == Request::kStart) start_permission_ = true;
   if (last_ && last_->phase == Phase::kStopped && s.phase == Phase::kDisarmed)
     permission_ = start_permission_ = false;
-  if (s.command.engaged && !permission_) broken("permitted", "the legs were taken without an order");
+  if (s.command.engaged && !permission_)
+    broken("permitted", "the legs were taken without an order");
   if (s.phase == Phase::kRunning && s.segment >= 0 && !start_permission_)
     broken("permitted", "a program begins without an order");
   if (s.kind != SegmentKind::kAdmittance && last_ && last_->kind == SegmentKind::kAdmittance &&
       s.tripped.any() && s.cause_tick == s.tick) {
-    for (const Check check : {Check::kMotionLimits, Check::kActuatorLimits, Check::kJointLimits,
-                              Check::kCollide, Check::kConditioning, Check::kVelocity, Check::kFlow})
+    for (const Check check :
+         {Check::kMotionLimits, Check::kActuatorLimits, Check::kJointLimits, Check::kCollide,
+          Check::kConditioning, Check::kVelocity, Check::kFlow})
       if (s.cause == check)
         broken("envelope", fmt::format("admittance control ran into {}", name(check)));
   }
@@ -317,8 +327,8 @@ void Laws::alone(std::int64_t time, const plant::Truth& truth) {
   const Vec6 most = Vec6::Constant(pace) + (stays ? 0.0 : 1.3 / park_time) * way;
   const Vec6 speed = truth.legs.L_dot.cwiseAbs();
   if (!((speed - most).maxCoeff() <= 0.0))
-    broken("alone", fmt::format("nobody commands, and a leg moves at {:.0f} mm/s",
-                                speed.maxCoeff() * 1e3));
+    broken("alone",
+           fmt::format("nobody commands, and a leg moves at {:.0f} mm/s", speed.maxCoeff() * 1e3));
   const Vec6 further = (L - L_home_).cwiseAbs() - (*alone_from_ - L_home_).cwiseAbs();
   if (!(further.maxCoeff() <= 3.0 * count_))
     broken("alone", fmt::format("nobody commands, and {} goes away from home", legText(further)));

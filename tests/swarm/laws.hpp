@@ -48,7 +48,8 @@ class Laws {
   void ticked(const TickInput& in, const TickState& state);
 
   void machineBegins();
-  /// The machine after a step; `taken` before it. `time` [ns] of its own. `loops_closed`: of safety.
+  /// The machine after a step; `taken` before it. `time` [ns] of its own. `loops_closed`: of
+  /// safety.
   void machine(std::int64_t time, const plant::Truth& truth, const std::optional<Taken>& taken,
                bool loops_closed);
   /// Of somebody who is not to be obeyed.
@@ -102,13 +103,13 @@ class Laws {
   // The machine.
   std::int64_t ghost_ = 0;
   bool heard_ours_ = false;
-  bool engaged_ = false;            // a command that engaged was taken
-  std::int64_t engaged_time_ = 0;   // [ns] the last such
-  Vec6 anchor_ = Vec6::Zero();      // [m] the checked lengths that came with it
+  bool engaged_ = false;           // a command that engaged was taken
+  std::int64_t engaged_time_ = 0;  // [ns] the last such
+  Vec6 anchor_ = Vec6::Zero();     // [m] the checked lengths that came with it
   bool frozen_ = false;
-  std::int64_t frozen_time_ = 0;                           // [ns]
+  std::int64_t frozen_time_ = 0;                                 // [ns]
   Vec6 frozen_low_ = Vec6::Zero(), frozen_high_ = Vec6::Zero();  // [m] from the anchor
-  bool loops_open_ = false;  // one has been, since the last command that engaged
+  bool loops_open_ = false;       // one has been, since the last command that engaged
   std::int64_t loop_opened_ = 0;  // [ns]
   std::optional<Vec6> alone_from_;
 };

@@ -73,7 +73,7 @@ std::vector<std::string> drawSettings(Dice& dice, const Scenario& scenario) {
     if (observer) maybe(0.3, c + "adaptation", "true");
     if (inertia) maybe(0.4, c + "wrench", "aided");
     if (inertia) maybe(0.3, c + "mass_update_ticks", std::to_string(dice.whole(2, 40)));
-    maybe(0.5, c + "ramp_s", fmt::format("{:.2f}", std::exp(dice.between(-4.0, 2.0))));
+    maybe(0.5, c + "ramp_s", fmt::format("{:.2f}", std::exp(dice.between(-4.0, 1.6))));
   }
   maybe(0.2, "controller.passivity.enabled", "true");
   if (dice.chance(0.3)) {
@@ -85,9 +85,9 @@ std::vector<std::string> drawSettings(Dice& dice, const Scenario& scenario) {
   maybe(0.2, "sensor.noise", "false");
   maybe(0.3, "gravity_m_per_s2", "0");
   if (dice.chance(0.3))
-    put("plant_mismatch", fmt::format("{{gain_extend: {:.3f}, gain_retract: {:.3f}, mass: {:.3f}}}",
-                                      dice.between(0.85, 1.15), dice.between(0.85, 1.15),
-                                      dice.between(0.9, 1.1)));
+    put("plant_mismatch",
+        fmt::format("{{gain_extend: {:.3f}, gain_retract: {:.3f}, mass: {:.3f}}}",
+                    dice.between(0.85, 1.15), dice.between(0.85, 1.15), dice.between(0.9, 1.1)));
   if (scenario.arm) put("base.keep_modes", dice.chance(0.7) ? "6" : "12");
   // Short, so that a life has time for them.
   put("legs.watchdog.park_after_s", fmt::format("{:.1f}", dice.between(0.6, 3.0)));
@@ -111,7 +111,8 @@ std::string drawRun(Dice& dice, const Experiment& e) {
                      hertz = std::exp(dice.between(-2.0, 0.7));
         text += fmt::format(" {} sine {:.2f} {:.3f}", coordinate(i).name, amplitude, hertz);
       } else {
-        text += fmt::format(" {} ramp {:.2f}", coordinate(i).name, reach(i) * dice.between(-.5, .5));
+        text +=
+            fmt::format(" {} ramp {:.2f}", coordinate(i).name, reach(i) * dice.between(-.5, .5));
       }
     }
     return text;
@@ -235,7 +236,8 @@ Life draw(std::uint64_t seed, const std::filesystem::path& config) {
   std::int64_t tick = dice.whole(25, 60);
   life.events.push_back(ask(tick, "arm"));
   for (;;) {
-    if (!dice.chance(0.1)) tick += 1 + ticksOf(dice.chance(0.2) ? dice.between(0.0, 0.1) : dice.between(0.0, 4.0));
+    if (!dice.chance(0.1))
+      tick += 1 + ticksOf(dice.chance(0.2) ? dice.between(0.0, 0.1) : dice.between(0.0, 4.0));
     if (tick >= life.ticks) break;
     if (dice.chance(trouble)) {
       Event event = dice.chance(0.5) ? drawFault(dice) : drawTrouble(dice);
@@ -291,8 +293,8 @@ std::string write(const Life& life, const std::string& comment) {
       life.logged);
   if (life.events.empty()) out += " []";
   for (const Event& e : life.events) {
-    out += fmt::format("\n  - {{tick: {}, {}: '{}'", e.tick, kKinds[static_cast<int>(e.kind)],
-                       e.what);
+    out +=
+        fmt::format("\n  - {{tick: {}, {}: '{}'", e.tick, kKinds[static_cast<int>(e.kind)], e.what);
     if (e.which != 0) out += fmt::format(", which: {}", e.which);
     if (e.amount != 0.0) out += fmt::format(", amount: {}", e.amount);
     if (e.ticks != 1) out += fmt::format(", ticks: {}", e.ticks);

@@ -40,14 +40,14 @@ struct Event {
 struct Life {
   std::uint64_t seed = 0;  // it was drawn from; 0: written by hand
   std::string scenario;
-  std::vector<std::string> set;        // as for --set
-  std::int64_t ticks = 0;              // [-] it lasts
-  std::int64_t sample_period = 0;      // [ns] of the machine's loop
-  std::int64_t machine_phase = 0;      // [ns] of its first step
-  std::int64_t latency = 0;            // [ns] of a message
-  std::int64_t clock_offset = 0;       // [ns] the machine's clock less the controller's
-  bool logged = false;                 // recorded, and replayed at the end
-  std::vector<Event> events;           // by tick
+  std::vector<std::string> set;    // as for --set
+  std::int64_t ticks = 0;          // [-] it lasts
+  std::int64_t sample_period = 0;  // [ns] of the machine's loop
+  std::int64_t machine_phase = 0;  // [ns] of its first step
+  std::int64_t latency = 0;        // [ns] of a message
+  std::int64_t clock_offset = 0;   // [ns] the machine's clock less the controller's
+  bool logged = false;             // recorded, and replayed at the end
+  std::vector<Event> events;       // by tick
 };
 
 /// Life number `seed`.

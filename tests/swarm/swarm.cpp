@@ -3,8 +3,8 @@
 // swarm: whole lives of controller and machine, drawn from seeds, and the laws of docs/safety.md
 // looked at in every tick of each.
 //
-//   swarm [--lives N | --days D | --seconds S] [--seed FIRST] [--workers W] [--out DIR] [--all] [--whole] [--only LAW]
-//   swarm FILE...          lives from files, as a failing one left them
+//   swarm [--lives N | --days D | --seconds S] [--seed FIRST] [--workers W] [--out DIR] [--all]
+//   [--whole] [--only LAW] swarm FILE...          lives from files, as a failing one left them
 //   swarm --show SEED      the life of a seed
 //
 // A life that breaks a law is cut down to what matters and written to DIR/swarm-SEED.yaml. Same
@@ -49,7 +49,8 @@ class Shrinker {
     if (Life calm = life_; (calm.logged = false, fails(calm))) life_ = calm;
     for (bool smaller = true; smaller;) {
       smaller = false;
-      for (std::size_t chunk = std::max<std::size_t>(1, life_.events.size() / 2); chunk > 0; chunk /= 2)
+      for (std::size_t chunk = std::max<std::size_t>(1, life_.events.size() / 2); chunk > 0;
+           chunk /= 2)
         for (std::size_t at = 0; at + chunk <= life_.events.size();) {
           Life less = life_;
           less.events.erase(less.events.begin() + static_cast<std::ptrdiff_t>(at),
@@ -159,8 +160,8 @@ int runSeeds(const Options& options) {
         Shrinker shrinker(options, draw(seed, options.config), *o.finding);
         const Life small = options.whole ? draw(seed, options.config) : shrinker.shrink();
         const fs::path file = options.out / fmt::format("swarm-{}.yaml", seed);
-        std::ofstream(file) << write(small, fmt::format("{}: {}", shrinker.finding().law,
-                                                        shrinker.finding().what));
+        std::ofstream(file) << write(
+            small, fmt::format("{}: {}", shrinker.finding().law, shrinker.finding().what));
         fmt::print("found in tick {} of the life\n", o.finding->tick);
         tell(small, shrinker.finding(), file.string());
         over = !options.all;
@@ -193,7 +194,8 @@ int runSeeds(const Options& options) {
   for (std::thread& worker : workers) worker.join();
   if (isatty(STDERR_FILENO)) fmt::print(stderr, "\n");
   fmt::print(
-      "{} lives, {:.3f} machine-days, {:.2f} million ticks ({:.0f} % in admittance control, {:.0f} % "
+      "{} lives, {:.3f} machine-days, {:.2f} million ticks ({:.0f} % in admittance control, {:.0f} "
+      "% "
       "of that compensated), {} stops; {} broke a law; hash "
       "{:016x}\n",
       lives, sum.seconds / 86400.0, 1e-6 * static_cast<double>(sum.ticks),
@@ -228,7 +230,8 @@ int main(int argc, char** argv) {
   std::vector<std::string> files;
   std::uint64_t show = 0;
   std::string config = VES_TEST_CONFIG_DIR;
-  CLI::App cli("Whole lives of controller and machine, drawn from seeds, every law in every tick.", "swarm");
+  CLI::App cli("Whole lives of controller and machine, drawn from seeds, every law in every tick.",
+               "swarm");
   cli.add_option("files", files, "lives to run, as a failing one left them");
   cli.add_option("--lives", options.lives, "so many");
   cli.add_option("--days", options.days, "or until so many days are simulated");

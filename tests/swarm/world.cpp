@@ -88,8 +88,8 @@ class World {
     plant::Plant plant;
     Sample sample;
     RobotOrders robot;
-    Machine(Ether& ether, std::int64_t clock, const Experiment& e,
-            const plant::PlantConfig& config, Identity who)
+    Machine(Ether& ether, std::int64_t clock, const Experiment& e, const plant::PlantConfig& config,
+            Identity who)
         : id(who),
           bus(std::make_unique<MemoryWire>(ether, clock)),
           link(bus, id),
@@ -107,7 +107,7 @@ class World {
     TickInput in;
     std::vector<std::uint8_t> file;
     std::unique_ptr<LogWriter> log;
-    std::int64_t begun;  // [-] tick of the life
+    std::int64_t begun;   // [-] tick of the life
     bool spoilt = false;  // the disk was full
     Controller(Ether& ether, const Experiment& e, Identity who, std::int64_t tick)
         : id(who),
@@ -149,11 +149,15 @@ class World {
       for (int i = 0; i < static_cast<int>(plant::Fault::kCount); ++i) {
         const auto fault = static_cast<plant::Fault>(i);
         if (event.what != plant::name(fault)) continue;
-        config.faults.push_back({{-1, (event.tick - tick) * period_}, event.ticks * period_, fault,
-                                 event.which, event.amount});
+        config.faults.push_back({{-1, (event.tick - tick) * period_},
+                                 event.ticks * period_,
+                                 fault,
+                                 event.which,
+                                 event.amount});
       }
     }
-    machine_.emplace(ether_, life_.clock_offset, e_, config, Identity{1000 + machines_, 1 + machines_});
+    machine_.emplace(ether_, life_.clock_offset, e_, config,
+                     Identity{1000 + machines_, 1 + machines_});
     ++machines_;
     laws_.machineBegins();
   }
@@ -233,8 +237,8 @@ class World {
     }
     c.in.sample = c.link.sample();
     c.in.conflicting_node = c.link.takeConflict() || c.in.conflicting_node;
-    c.in.time = c.link.clock().known() ? ether_.now + c.link.clock().offset(ether_.now)
-                                       : c.in.sample.time;
+    c.in.time =
+        c.link.clock().known() ? ether_.now + c.link.clock().offset(ether_.now) : c.in.sample.time;
     const TickState& state = c.platform.tick(c.in);
     const header_t h = header(c.id, c.in.tick, ether_.now);
     const leg_command_t command = toMessage(state.command, h);
@@ -281,7 +285,8 @@ class World {
     if (c.spoilt && c.file.empty()) return;  // there never was room for it
     const std::string file = (scratch_ / fmt::format("{}.lcmlog", life_.seed)).string();
     std::ofstream(file, std::ios::binary)
-        .write(reinterpret_cast<const char*>(c.file.data()), static_cast<std::streamsize>(c.file.size()));
+        .write(reinterpret_cast<const char*>(c.file.data()),
+               static_cast<std::streamsize>(c.file.size()));
     try {
       LogReader reader(file);
       LogEvent event;
@@ -290,9 +295,10 @@ class World {
       if (states > 0 && !c.spoilt) {
         const ReplayResult r = replay(file, {}, nullptr);
         if (r.different > 0)
-          laws_.broken("log", fmt::format("{} of {} messages replay otherwise, first tick {}: {} {} for {}",
-                                          r.different, r.messages, r.first->tick, r.first->field,
-                                          r.first->replayed, r.first->recorded));
+          laws_.broken(
+              "log", fmt::format("{} of {} messages replay otherwise, first tick {}: {} {} for {}",
+                                 r.different, r.messages, r.first->tick, r.first->field,
+                                 r.first->replayed, r.first->recorded));
       }
     } catch (const InputError& error) {
       laws_.broken("log", error.what());
@@ -308,8 +314,8 @@ class World {
       case Kind::kSamples:
       case Kind::kCommands:
         std::erase_if(troubles_, [this](const Trouble& t) { return tick_ >= t.until; });
-        troubles_.push_back({event.kind, event.what, tick_ + event.ticks,
-                             static_cast<std::int64_t>(event.amount)});
+        troubles_.push_back(
+            {event.kind, event.what, tick_ + event.ticks, static_cast<std::int64_t>(event.amount)});
         break;
       case Kind::kStall:
         stalled_until_ = tick_ + event.ticks;
@@ -367,7 +373,8 @@ class World {
     intruder_.machine = machine_->id.source;
     intruder_.engaged = 1;
     intruder_.segment = -1;
-    for (std::size_t i = 0; i < 6; ++i) intruder_.counts[i] = intruder_.rest[i] = machine_->sample.legs[i] + 40;
+    for (std::size_t i = 0; i < 6; ++i)
+      intruder_.counts[i] = intruder_.rest[i] = machine_->sample.legs[i] + 40;
     if (ghost) laws_.ghost(kGhost);
   }
 
@@ -390,7 +397,7 @@ class World {
   std::optional<Machine> machine_;
   std::optional<Controller> controller_;
   std::int64_t tick_ = 0, next_machine_ = 0;
-  std::int64_t machines_ = 0, controllers_ = 0, orders_ = 0;  // [-] so far
+  std::int64_t machines_ = 0, controllers_ = 0, orders_ = 0;                   // [-] so far
   std::int64_t machine_back_ = -1, controller_back_ = -1, stalled_until_ = 0;  // [-] ticks
   std::int64_t intruder_until_ = 0, disk_until_ = 0;
   leg_command_t intruder_{};

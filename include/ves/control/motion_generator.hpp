@@ -43,7 +43,7 @@ class MotionGenerator {
   std::int64_t idleTicks(std::int64_t tick) const noexcept;
 
   const Waypoint<6>& motion() const noexcept { return motion_; }  // last commanded
-  const Vec6& desired() const noexcept { return desired_; }        // at this very tick
+  const Vec6& desired() const noexcept { return desired_; }       // at this very tick
   const AdmittanceControl& admittance() const noexcept { return admittance_; }
   MotionPlan planned(const Segment& segment) const noexcept {
     return MotionPlan::of(settings_, segment, motion_);

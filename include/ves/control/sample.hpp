@@ -50,9 +50,9 @@ struct Sample {
 
 struct LegCommand {
   bool engaged = false;       // false: the legs stay where they are and ignore the counts
-  LegCounts counts{};         // [count] (C.13) what the servos are told, so that the legs are at
-  LegCounts rest{};           // [count] the checked lengths, where they stay without a next command,
-  std::int64_t ahead = 0;     // [ns] so long after the tick
+  LegCounts counts{};         // [count] (C.13) what the servos are told
+  LegCounts rest{};           // [count] the checked lengths: where the legs stay, should none follow
+  std::int64_t ahead = 0;     // [ns] after its tick, for which those are meant
   std::int32_t segment = -1;  // [-] where the program is; other equipment takes its cue from it
   bool park = false;          // should no command follow, the legs may go home slowly
 };

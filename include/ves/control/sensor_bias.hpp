@@ -32,8 +32,8 @@ class Tare {
   State state_ = State::kNone;
   ChannelStatistics statistics_;
   Vec6 before_ = Vec6::Zero();  // [count] the bias
-  Quintic<6> path_;     // [count]
-  std::int64_t n_ = 0;  // [-] ticks since the ramp began
+  Quintic<6> path_;             // [count]
+  std::int64_t n_ = 0;          // [-] ticks since the ramp began
 };
 
 class SensorBias {

@@ -90,7 +90,7 @@ class Supervisor {
   bool aborted_ = false;                      // the program: a calibration or a start was refused
   Refusal aborted_by_ = Refusal::kNone;       // why, of a start
   Answers answers_;
-  Order rehearsed_;                           // the order whose path is being checked
+  Order rehearsed_;  // the order whose path is being checked
   Rehearsal rehearsal_;
   Tripped tripped_;               // in the last tick
   Tripped latched_;               // since the start

@@ -69,17 +69,17 @@ struct TickState {
   double violation_amount = 0.0;                                 // [count | rad | m]
   Vec6 deviation = Vec6::Zero();                                 // [count] of a channel's samples
   Vec6 standard_error = Vec6::Zero();                            // [count] of the bias
-  bool aborted = false;            // the program: a calibration or a start was refused
+  bool aborted = false;                 // the program: a calibration or a start was refused
   Refusal aborted_by = Refusal::kNone;  // why the start was
-  double envelope_scale = 1.0;     // [-] of the admittance model's step that was taken
-  double energy_put_in = 0.0;      // [J] by the emulation, since admittance control began
-  double energy_paid = 0.0;        // [J] by the model's modes, to the passivity controller
-  double passivity_damping = 0.0;  // [1/s] of every mode, in the next step
-  std::int64_t late_ticks = 0;     // [-] so far
-  Tripped tripped;                 // in this tick
-  Tripped latched;                 // since the start
-  Check cause = Check::kCount;     // the first to latch
-  std::int64_t cause_tick = -1;    // [-]
+  double envelope_scale = 1.0;          // [-] of the admittance model's step that was taken
+  double energy_put_in = 0.0;           // [J] by the emulation, since admittance control began
+  double energy_paid = 0.0;             // [J] by the model's modes, to the passivity controller
+  double passivity_damping = 0.0;       // [1/s] of every mode, in the next step
+  std::int64_t late_ticks = 0;          // [-] so far
+  Tripped tripped;                      // in this tick
+  Tripped latched;                      // since the start
+  Check cause = Check::kCount;          // the first to latch
+  std::int64_t cause_tick = -1;         // [-]
   LegCommand command;
 };
 

@@ -38,8 +38,8 @@ struct FaultBench {
   std::filesystem::path program;  // `ves`: the controller and the plant of rows with processes
 };
 
-/// Rows with processes need a bus: enterPrivateBus() first. Throws InputError where faults.yaml, the
-/// scenario or a setting is wrong.
+/// Rows with processes need a bus: enterPrivateBus() first. Throws InputError where faults.yaml,
+/// the scenario or a setting is wrong.
 std::vector<FaultRow> faultTable(const FaultBench& bench);
 
 }  // namespace ves

@@ -171,8 +171,8 @@ class Plant {
   std::int64_t segment_start_ = 0;                      // [ns]
   std::array<std::int64_t, kMaxSegments + 1> began_{};  // [ns] each segment; kNever: not yet
   std::int64_t next_robot_event_ = kNever;              // [ns]
-  std::vector<Injector> injectors_;      // one a fault
-  std::vector<FaultEvent> valve_faults_;  // those that are not of samples
+  std::vector<Injector> injectors_;                     // one a fault
+  std::vector<FaultEvent> valve_faults_;                // those that are not of samples
   std::vector<bool> robot_event_done_;
   int refused_events_ = 0;
   MovingRobot robot_;  // all rigid plates counted into its base

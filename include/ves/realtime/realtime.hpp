@@ -41,8 +41,8 @@ class Ticker {
 };
 
 /// Real-time conduct of this process: SCHED_FIFO at `priority`, memory locked, stack touched. When
-/// `required`, throws InputError with the reason. Returns what was refused, and why; empty: nothing.
-/// Threads that are begun afterwards do not inherit it.
+/// `required`, throws InputError with the reason. Returns what was refused, and why; empty:
+/// nothing. Threads that are begun afterwards do not inherit it.
 std::string claimRealtime(int priority, bool required);
 
 }  // namespace ves
