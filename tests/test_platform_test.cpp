@@ -275,5 +275,24 @@ TEST(TestPlatform, AfterALongStallItLetsGoOfLegsThatWentHomeAlone) {
   }
 }
 
+TEST(TestPlatform, AfterAResetNothingMovesWithoutANewOrderInWhicheverTickTheTripCame) {
+  const Experiment e = experiment("z_sine");
+  for (const Request request : {Request::kStart, Request::kArm})
+    for (int tick = 0; tick < 25; ++tick) {
+      test::Rig rig(e);
+      rig.run(8);  // it arms two or three ticks later
+      rig.tick(request);
+      rig.run(tick);
+      rig.disturb([](Sample& s) { s.switches = 0; });
+      rig.tick();
+      rig.disturb([](Sample&) {});
+      rig.run(20);
+      if (rig.state().phase == Phase::kStopped) rig.tick(Request::kReset);
+      rig.run(300);
+      EXPECT_EQ(rig.state().phase, Phase::kDisarmed) << name(request) << " " << tick;
+      EXPECT_FALSE(rig.state().command.engaged) << name(request) << " " << tick;
+    }
+}
+
 }  // namespace
 }  // namespace ves

@@ -61,7 +61,7 @@ Vec6 LegCommander::referenceOf(const LegMotion& legs, double ahead, double share
   if (!compensation_.any()) return legs.L;
   Vec6 L = legs.L;
   if (compensation_.feed_forward) L = feedForward(servo.model(), legs, ahead, period_, share);
-  if (compensation_.observer && command_.engaged) L += share * servo.rounding(legs.L_dot, age);
+  if (compensation_.observer) L += share * servo.rounding(legs.L_dot, age);
   return L.cwiseMax(leg_min_).cwiseMin(leg_max_);
 }
 

@@ -198,6 +198,8 @@ void Laws::trips(const TickState& s) {
   const bool stop = s.phase == Phase::kStopping || s.phase == Phase::kStopped;
   if (stop && (s.cause == Check::kCount || s.cause_tick < 0 || !s.latched.has(s.cause)))
     broken("trip", "stopped without a cause");
+  if (s.phase == Phase::kStopped && !s.motion.x_dot.isZero(0.0))
+    broken("trip", "stopped, and says that it moves");
   if (!stop && s.cause != Check::kCount) broken("trip", "a cause without a stop");
   if (s.phase != Phase::kStopping) stopping_since_ = -1;
   if (s.phase == Phase::kStopping && stopping_since_ < 0) stopping_since_ = s.tick;

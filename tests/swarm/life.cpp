@@ -239,6 +239,16 @@ Life draw(std::uint64_t seed, const std::filesystem::path& config) {
     if (!dice.chance(0.1))
       tick += 1 + ticksOf(dice.chance(0.2) ? dice.between(0.0, 0.1) : dice.between(0.0, 4.0));
     if (tick >= life.ticks) break;
+    // The button falls just when something begins.
+    const bool arming = !life.events.empty() && life.events.back().tick + 20 > tick &&
+                        (life.events.back().what == "arm" || life.events.back().what == "program");
+    if (arming && trouble > 0.0 && dice.chance(0.3)) {
+      const std::int64_t button = life.events.back().tick + dice.whole(0, 15);
+      life.events.push_back({button, Kind::kFault, "panic_button", 0, 0.0, dice.whole(1, 4)});
+      tick = button + dice.whole(5, 60);
+      life.events.push_back(ask(tick, "reset"));
+      continue;
+    }
     if (dice.chance(trouble)) {
       Event event = dice.chance(0.5) ? drawFault(dice) : drawTrouble(dice);
       event.tick = tick;
