@@ -168,6 +168,16 @@ TEST(Supervisor, APathIsCheckedOverSomeTicksBeforeItBegins) {
   for (int n = 0; n < 20; ++n) EXPECT_NE(tripped.advance().phase, Phase::kRunning);
 }
 
+TEST(Supervisor, APathOrderedWhileAProgramIsAboutToBeginIsRefused) {
+  // Else it would be gone through, and begun, when the program is over.
+  Desk desk(puma());
+  desk.order(Request::kStart);
+  ASSERT_EQ(desk.supervisor.phase(), Phase::kArmed);
+  const TickState asked = desk.order(Request::kRun, test::sine(2, 0.1, 0.5, 2.0));
+  EXPECT_EQ(asked.refusal, Refusal::kBusy);
+  EXPECT_EQ(asked.phase, Phase::kRunning);
+}
+
 TEST(Supervisor, AHoldIsAMoveThatBrakes) {
   Desk desk(puma());
   desk.arm();
