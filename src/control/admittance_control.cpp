@@ -16,7 +16,13 @@ AdmittanceControl::AdmittanceControl(const ControllerConfig& config)
       period_(config.periodSeconds()),
       joint_moves_(config.stillness.joint),
       growth_floor_(config.safety.growth_floor),
-      braking_(config.gentle.braking) {}
+      braking_(config.gentle.braking),
+      slow_(std::min(config.safety.leg_velocity, config.safety.flow / config.safety.bore_area)) {
+  constexpr double kTurns =
+      2.0;  // [-] angular velocity per rates of the fixed angles, below 60 deg
+  for (const Vec3& joint : config.geometry.p_PPi_P)
+    reach_ = std::max(reach_, kTurns * joint.norm());
+}
 
 void AdmittanceControl::begin(const Vec6& x, const Mat6& M_1, double age, double share) noexcept {
   model_.reset(x, M_1, inertia_ ? age + share * wrench_delay_ : 0.0);
@@ -58,10 +64,13 @@ void AdmittanceControl::slowInsideEnvelope(const Vec6& last, const Vec6& L,
     const Pose rest = Pose::from(last + scale * step + 0.5 * brake_time * v);
     const Transform X_rest = geometry.fromHome(rest);
     const Vec6 L_next = legLengths(geometry, geometry.fromHome(next));
-    const Pose then = Pose::from(last + scale * step + period_ * v);  // no braking is faster
-    return !checks.pose(X_rest, rest, legLengths(geometry, X_rest)).any() &&
-           !checks.step(L_next, L, period_).any() &&
-           !checks.step(legLengths(geometry, geometry.fromHome(then)), L_next, period_).any();
+    if (checks.pose(X_rest, rest, legLengths(geometry, X_rest)).any() ||
+        checks.step(L_next, L, period_).any())
+      return false;
+    // No braking is faster than the rate that it begins with.
+    if (v.head<3>().norm() + reach_ * v.tail<3>().norm() <= slow_) return true;
+    const Pose then = Pose::from(last + scale * step + period_ * v);
+    return !checks.step(legLengths(geometry, geometry.fromHome(then)), L_next, period_).any();
   };
   scale_ = 1.0;
   if (fits(1.0)) return;

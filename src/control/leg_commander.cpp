@@ -25,7 +25,7 @@ void LegCommander::send(const Checked& next, std::int32_t segment, double share,
   command_.engaged = true;
   command_.segment = segment;
   command_.counts = legCounts(codec_, reference_ + rounding_residual_);
-  command_.rest = legCounts(codec_, legs_.L);
+  command_.rest = compensation_.any() ? legCounts(codec_, legs_.L) : command_.counts;
   command_.ahead = std::llround(ahead_ * 1e9);
   rounding_residual_ += reference_ - legLengths(codec_, command_.counts);
 }

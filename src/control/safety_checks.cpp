@@ -49,6 +49,7 @@ bool freezes(Check check) noexcept {
 }
 
 bool Tripped::freeze() const noexcept {
+  if (bits_ == 0) return false;
   bool any = false;
   forEach([&](Check check) { any = any || freezes(check); });
   return any;

@@ -60,6 +60,8 @@ class AdmittanceControl {
   double joint_moves_;   // [rad | m] what counts as a motion of the robot
   double growth_floor_;  // [J]
   Braking braking_;      // before the limits
+  double slow_;          // [m/s] no leg of such a speed is too fast
+  double reach_ = 0.0;   // [m] of a leg's joint per rate of the fixed angles, at most
   double scale_ = 1.0;
 };
 
