@@ -284,8 +284,9 @@ void Laws::follow(std::int64_t time, const plant::Truth& truth, const Taken& tak
   const auto said = said_.find(taken.tick);
   const bool ours = taken.source == source_ && said != said_.end();
   const bool stopped = ours && said->second.stopped;
+  const Vec6 before = anchor_;
   anchor_ = ours ? said->second.L : legLengths(c_.legs, taken.command.counts);
-  if (stopped && !frozen_) {
+  if (stopped && (!frozen_ || anchor_ != before)) {  // another stop, of which this is heard first
     frozen_time_ = time;
     const Vec6 from = truth.legs.L - anchor_;
     // The servo's own: of a speed that it has to lose, and of a step that it has to make.
