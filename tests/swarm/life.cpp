@@ -253,6 +253,13 @@ Life draw(std::uint64_t seed, const std::filesystem::path& config) {
       Event event = dice.chance(0.5) ? drawFault(dice) : drawTrouble(dice);
       event.tick = tick;
       life.events.push_back(event);
+      // One that comes back, looks, and is gone again.
+      if (event.kind == Kind::kController && dice.chance(0.4)) {
+        event.tick += event.ticks + dice.whole(5, 60);
+        event.ticks = dice.whole(200, 1600);
+        life.events.push_back(event);
+        tick = event.tick + event.ticks;
+      }
       if (dice.chance(0.6)) {
         tick += event.ticks + dice.whole(0, 200);
         life.events.push_back(ask(tick, "reset"));
