@@ -364,6 +364,7 @@ TEST_F(Console, WhatTheBareProcessCannotDoIsRefused) {
 }
 
 TEST_F(Console, AControllerThatMayWriteNoMoreBringsThePlatformHome) {
+  enterPrivateBus();
   // SIGXFSZ ends a process that has not said otherwise, in the middle of the motion.
   const Output o = sh("cd " + folder_.string() + "; ulimit -f 40; " + app("controller") +
                       "z_sine --lockstep --start --log a.lcmlog & controller=$!; " + app("plant") +
