@@ -57,6 +57,7 @@ void AdmittanceControl::slowInsideEnvelope(const Vec6& last, const Vec6& L,
                                            const PathChecks& checks) noexcept {
   const Geometry& geometry = checks.geometry();
   const Vec6 step = model_.motion().x - last, rate = model_.motion().x_dot;
+  constexpr double kStraight = 1e-4;  // [m, rad] what a gentle acceleration does in a period
   const auto fits = [&](double scale) {
     const Vec6 v = scale * rate;  // that a braking motion would begin with
     const double brake_time = brakeTime(v, braking_);
@@ -67,6 +68,9 @@ void AdmittanceControl::slowInsideEnvelope(const Vec6& last, const Vec6& L,
     if (checks.pose(X_rest, rest, legLengths(geometry, X_rest)).any() ||
         checks.step(L_next, L, period_).any())
       return false;
+    // Where the rate leads elsewhere than the step did, between the two.
+    const bool turns = !((scale * step - period_ * v).norm() <= kStraight);
+    if (turns && checks.pose(geometry.fromHome(next), next, L_next).any()) return false;
     // No braking is faster than the rate that it begins with.
     if (v.head<3>().norm() + reach_ * v.tail<3>().norm() <= slow_) return true;
     const Pose then = Pose::from(last + scale * step + period_ * v);
