@@ -18,8 +18,7 @@ AdmittanceControl::AdmittanceControl(const ControllerConfig& config)
       growth_floor_(config.safety.growth_floor),
       braking_(config.gentle.braking),
       slow_(std::min(config.safety.leg_velocity, config.safety.flow / config.safety.bore_area)) {
-  constexpr double kTurns =
-      2.0;  // [-] angular velocity per rates of the fixed angles, below 60 deg
+  constexpr double kTurns = 2.0;  // [-] angular velocity per rates of the fixed angles, at most
   for (const Vec3& joint : config.geometry.p_PPi_P)
     reach_ = std::max(reach_, kTurns * joint.norm());
 }
