@@ -70,9 +70,11 @@ void floodMalformed(int count) {
     sendto(fd, datagram.data(), datagram.size(), 0, reinterpret_cast<const sockaddr*>(&to),
            sizeof to);
   };
-  const std::string name = channel::kLegCommand + '\0';
+  const std::string channels[] = {channel::kLegCommand, channel::kSample,     channel::kState,
+                                  channel::kOperator,   std::string(60, 'x'), ""};
   std::mt19937 random(1);
   for (int i = 0; i < count; ++i) {
+    const std::string name = channels[random() % std::size(channels)] + '\0';
     std::string noise(random() % 1400, ' ');
     for (char& c : noise) c = static_cast<char>(random());
     switch (i % 4) {
@@ -83,7 +85,7 @@ void floodMalformed(int count) {
     }
     if (i % 200 == 0) usleep(2000);
   }
-  const std::string head("LC03\0\0\0\1\0\0\0\144", 12);
+  const std::string name = channel::kLegCommand + '\0', head("LC03\0\0\0\1\0\0\0\144", 12);
   send(head + std::string("\0\0\0\0\0\0\0\3", 8) + name);
   send(head + std::string("\377\377\377\360\0\1\0\3", 8) + std::string(64, 'x'));
   close(fd);
