@@ -30,7 +30,7 @@ std::vector<Vec6> foretold(const ServoModel& servo, double period, double phase,
 
 /// Of LegSlaves whose updates had this phase at the start.
 ServoEstimate fit(const ServoModel& nominal, double period, double phase, const LegRecord& record) {
-  constexpr int kTurns = 12;
+  constexpr int kTurns = 12, kBlocks = 10;
   // Steps of the differences: counts make the model's answer rough, so none is very small.
   const Parameters step(0.02, 0.02, 0.05, 0.0);
   constexpr double kDelayStep = 2e-4, kMostDelay = 0.02, kLeastTau = 1e-3;  // [s]
@@ -57,7 +57,7 @@ ServoEstimate fit(const ServoModel& nominal, double period, double phase, const 
     }
     for (int leg = 0; leg < kLegs; ++leg) {
       Eigen::Matrix4d JJ = Eigen::Matrix4d::Zero();
-      Parameters Je = Parameters::Zero();
+      Eigen::Matrix<double, 4, kBlocks> Je = Eigen::Matrix<double, 4, kBlocks>::Zero();
       double squares = 0.0;
       for (std::size_t k = 0; k < now.size(); ++k) {
         Parameters J;
@@ -65,7 +65,7 @@ ServoEstimate fit(const ServoModel& nominal, double period, double phase, const 
           J(static_cast<Eigen::Index>(p)) = changed[p][k](leg) / by[p](leg);
         const double e = record.length[k](leg) - now[k](leg);
         JJ += J * J.transpose();
-        Je += J * e;
+        Je.col(static_cast<Eigen::Index>(k * kBlocks / now.size())) += J * e;
         squares += e * e;
       }
       // In units of the parameters' own size, so that conditioning means something.
@@ -77,15 +77,18 @@ ServoEstimate fit(const ServoModel& nominal, double period, double phase, const 
                                 " moves too little to tell gains, lag and delay apart");
       out.residual(leg) = std::sqrt(squares / static_cast<double>(n));
       if (turn == kTurns) {
-        const Eigen::Matrix4d covariance = size.asDiagonal() *
-                                           solvePositive(scaled, Eigen::Matrix4d::Identity()) *
-                                           size.asDiagonal() * squares / static_cast<double>(n - 4);
+        // What the model does not foretell comes from counts and lasts: not each tick's by itself,
+        // but each block's (the sandwich estimator of clusters).
+        const Eigen::Matrix<double, 4, kBlocks> by_block =
+            size.asDiagonal() * solvePositive(scaled, size.asDiagonal() * Je);
+        const Parameters deviation =
+            by_block.rowwise().norm() * std::sqrt(kBlocks / (kBlocks - 1.0));
         for (std::size_t p = 0; p < 4; ++p)
-          (out.deviation.*kParameters[p])(leg) =
-              std::sqrt(covariance(static_cast<Eigen::Index>(p), static_cast<Eigen::Index>(p)));
+          (out.deviation.*kParameters[p])(leg) = deviation(static_cast<Eigen::Index>(p));
         continue;
       }
-      const Parameters change = size.asDiagonal() * solvePositive(scaled, size.asDiagonal() * Je);
+      const Parameters change =
+          size.asDiagonal() * solvePositive(scaled, size.asDiagonal() * Je.rowwise().sum());
       for (std::size_t p = 0; p < 4; ++p)
         (out.servo.*kParameters[p])(leg) += change(static_cast<Eigen::Index>(p));
       out.servo.tau(leg) = std::max(kLeastTau, out.servo.tau(leg));

@@ -80,26 +80,28 @@ void addTracking(const Series& series, nlohmann::ordered_json& out) {
 /// Of the coordinate that moves most, an angle counted at the joints' radius.
 void addIndicators(const Series& series, nlohmann::ordered_json& out) {
   const double radius = jointRadius(series.experiment.controller.geometry);
-  std::vector<double> due[6], actual[6];
-  for (const Row& row : series.rows)
-    if (measured(row))
-      for (int i = 0; i < 6; ++i) {
-        due[i].push_back(row.state.x_desired[i]);
-        actual[i].push_back(row.truth.x[i]);
-      }
-  int most = 0;
-  double widest = 0.0;
-  for (int i = 0; i < 6; ++i) {
-    if (due[i].empty()) return;
-    const auto [low, high] = std::minmax_element(due[i].begin(), due[i].end());
-    const double range = (*high - *low) * (i < 3 ? 1.0 : radius);
-    if (!(range > widest)) continue;
-    widest = range;
-    most = i;
+  std::vector<TrackedMotion> segments[6];
+  const Row* before = nullptr;
+  Vec6 low = Vec6::Constant(HUGE_VAL), high = -low;
+  for (const Row& row : series.rows) {
+    if (!measured(row)) continue;
+    const bool goes_on = before && before->state.segment == row.state.segment &&
+                         before->state.header.sequence + 1 == row.state.header.sequence;
+    before = &row;
+    low = low.cwiseMin(Vec6::Map(row.state.x_desired));
+    high = high.cwiseMax(Vec6::Map(row.state.x_desired));
+    for (int i = 0; i < 6; ++i) {
+      if (!goes_on) segments[i].emplace_back();
+      segments[i].back().u.push_back(row.state.x_desired[i]);
+      segments[i].back().y.push_back(row.truth.x[i]);
+    }
   }
-  if (!(widest > kMoved)) return;
+  Vec6 range = high - low;
+  range.tail<3>() *= radius;
+  int most = 0;
+  if (!(range.maxCoeff(&most) > kMoved)) return;
   const TrackingIndicators t =
-      trackingIndicators(due[most], actual[most], series.experiment.controller.periodSeconds());
+      trackingIndicators(std::move(segments[most]), series.experiment.controller.periodSeconds());
   out["tracking_coordinate"] = coordinate(most).name;
   out["tracking_delay_s"] = t.delay;
   out["tracking_rms"] = t.rms;
@@ -124,9 +126,7 @@ void addWrench(const Series& series, nlohmann::ordered_json& out) {
   bool calibrated = false;
   double still_since = HUGE_VAL;
   for (const Row& row : series.rows) {
-    const double rate = *std::max_element(row.state.x_dot, row.state.x_dot + 6) -
-                        *std::min_element(row.state.x_dot, row.state.x_dot + 6);
-    if (rate != 0.0 || still_since == HUGE_VAL) still_since = row.t;
+    if (!Vec6::Map(row.state.x_dot).isZero(0.0) || still_since == HUGE_VAL) still_since = row.t;
     if (!running(row)) continue;
     if (kindOf(row) == SegmentKind::kCalibration) {
       calibrated = true;

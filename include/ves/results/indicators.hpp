@@ -7,6 +7,11 @@
 
 namespace ves {
 
+/// A motion without a gap, a point every period: what is due, and what came.
+struct TrackedMotion {
+  std::vector<double> u, y;  // equally many
+};
+
 /// Of y beside u, what it should be; without their means.
 struct TrackingIndicators {
   double delay = 0.0;  // [s] by which u has to be moved to lie closest to y, at most half a second
@@ -22,7 +27,9 @@ struct TrackingIndicators {
   double fdb_frequency = 0.0, fdb_delay = 0.0;  // [Hz], [s]
 };
 
-/// u and y a point every `period` [s], equally many.
-TrackingIndicators trackingIndicators(std::vector<double> u, std::vector<double> y, double period);
+/// Of several motions together, each without its own mean and moved in time within itself: a jump
+/// from the end of one to the start of the next is nobody's motion. Those shorter than four times
+/// the longest delay do not count. `period` [s] between points.
+TrackingIndicators trackingIndicators(std::vector<TrackedMotion> motions, double period);
 
 }  // namespace ves
