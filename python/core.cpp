@@ -74,7 +74,7 @@ Vec6 forwardPoseOf(const Geometry& g, const Vec6& L, const Vec6& guess) {
 
 py::tuple legMotionOf(const Geometry& g, const Vec6& pose, const Vec6& rates,
                       const Vec6& accelerations) {
-  const LegMotion legs = legMotion(g, bodyMotion(g, Pose::from(pose), rates, accelerations));
+  const LegMotion legs = legMotion(g, bodyMotion(g.home(), Pose::from(pose), rates, accelerations));
   return py::make_tuple(legs.L, legs.L_dot, legs.L_ddot);
 }
 

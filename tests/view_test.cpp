@@ -267,16 +267,17 @@ TEST(BaseMotion, IsKnownFromItsStartToItsEnd) {
   const RecordedRun run = puma();
   const auto emulated = emulation(run.series);
   ASSERT_TRUE(emulated);
-  EXPECT_FALSE(emulated->at(-1));
-  EXPECT_LT((*emulated->at(0) - commanded(run.series).x.front()).norm(), 1e-12);
-  const auto last = std::ssize(emulated->base.x) - 1;
-  EXPECT_TRUE(emulated->at(last));
-  EXPECT_FALSE(emulated->at(last + 1));
+  const Motion& base = emulated->base;
+  EXPECT_FALSE(base.point(-1));
+  EXPECT_LT((*base.point(0) - commanded(run.series).x.front()).norm(), 1e-12);
+  const auto last = std::ssize(base.x) - 1;
+  EXPECT_TRUE(base.point(last));
+  EXPECT_FALSE(base.point(last + 1));
   // Live, it begins where the platform is let go: the same motion.
   ReferenceMotions references;
   const auto live = baseMotion(run.series.experiment, commanded(run.series).x.front(), references);
   ASSERT_TRUE(live);
-  EXPECT_EQ(*live->at(last), *emulated->at(last));
+  EXPECT_EQ(*live->point(last), *base.point(last));
 }
 
 TEST(Still, IsADrawingOfEveryBody) {

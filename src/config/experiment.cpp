@@ -286,7 +286,7 @@ Interaction interactionOf(const Experiment& experiment, std::int64_t& duration) 
   out.base = experiment.controller.admittance;
   out.payload = experiment.plant.payload;
   out.world = experiment.plant.world;
-  out.X_IH = experiment.plant.geometry.fromHome({});
+  out.p_IH = experiment.plant.geometry.home();
   MovingRobot before(out.payload.robot, experiment.plant.initial_joints);
   std::int64_t now = 0;
   RobotAction in_hand = Release{};

@@ -93,7 +93,7 @@ void Rehearsal::advance(const PathChecks& checks, double period,
   for (std::int64_t poses = 0; poses < kPosesATick && n_ <= plan_.steps(); ++poses) {
     const PathPoint<6> at = plan_.at(n_, path);
     const Pose x = Pose::from(at.x);
-    const BodyMotion P = bodyMotion(checks.geometry(), x, at.x_dot, at.x_ddot);
+    const BodyMotion P = bodyMotion(checks.geometry().home(), x, at.x_dot, at.x_ddot);
     const LegMotion legs = legMotion(checks.geometry(), P);
     // From one sample to the next, and at the sample itself.
     const double since = static_cast<double>(std::max<std::int64_t>(1, n_ - last_)) * period;

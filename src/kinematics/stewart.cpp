@@ -114,11 +114,11 @@ LegMotion legMotion(const Geometry& geometry, const BodyMotion& P) noexcept {
   return out;
 }
 
-BodyMotion bodyMotion(const Geometry& geometry, const Pose& x, const Vec6& x_dot,
+BodyMotion bodyMotion(const Vec3& p_IH, const Pose& x, const Vec6& x_dot,
                       const Vec6& x_ddot) noexcept {
   const Mat3 E = angleRateMap(x.rpy);
   BodyMotion P;
-  P.X = geometry.fromHome(x);
+  P.X = {rotation(x.rpy), x.p + p_IH};
   P.v = x_dot.head<3>();
   P.w = E * x_dot.tail<3>();
   P.a = x_ddot.head<3>();

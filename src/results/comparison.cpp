@@ -10,6 +10,11 @@
 
 namespace ves {
 
+std::optional<Vec6> Motion::point(std::int64_t after) const {
+  if (after < 0 || after >= std::ssize(x)) return {};
+  return x[static_cast<std::size_t>(after)];
+}
+
 bool inAdmittance(const state_t& state) noexcept {
   return state.phase == static_cast<int>(Phase::kRunning) &&
          state.kind == static_cast<int>(SegmentKind::kAdmittance);
@@ -83,13 +88,8 @@ std::optional<Emulation> emulation(const Series& series) {
   return emulation(series, references);
 }
 
-std::optional<Vec6> BaseMotion::at(std::int64_t tick) const {
-  if (tick < 0 || tick >= std::ssize(base.x)) return {};
-  return base.x[static_cast<std::size_t>(tick)] + rest;
-}
-
-std::optional<BaseMotion> baseMotion(const Experiment& e, const Vec6& start,
-                                     ReferenceMotions& references) {
+std::optional<Motion> baseMotion(const Experiment& e, const Vec6& start,
+                                 ReferenceMotions& references) {
   constexpr Eigen::Index kMostModes = 12;
   if (!wantsAdmittance(e.controller.program) ||
       e.controller.admittance.stiffness.size() > kMostModes)
@@ -97,11 +97,8 @@ std::optional<BaseMotion> baseMotion(const Experiment& e, const Vec6& start,
   std::int64_t duration = 0;
   Interaction interaction = interactionOf(e, duration);
   const Eigen::VectorXd eta = leastSquares(interaction.base.Phi, start);
-  const Vec6 rest = start - interaction.base.Phi * eta;
-  if (interaction.world) interaction.X_IH.p += rest.head<3>();
-  const auto base = references.of(interaction, e.controller.period, duration, eta);
-  if (!*base) return {};
-  return BaseMotion{**base, rest};
+  interaction.rest = start - interaction.base.Phi * eta;
+  return *references.of(interaction, e.controller.period, duration, eta);
 }
 
 std::optional<Emulation> emulation(const Series& series, ReferenceMotions& references) {
@@ -110,18 +107,17 @@ std::optional<Emulation> emulation(const Series& series, ReferenceMotions& refer
   if (out.platform.x.size() < 2) return {};
   const auto base = baseMotion(series.experiment, commanded(series).x.front(), references);
   if (!base) return {};
-  static_cast<BaseMotion&>(out) = *base;
-  for (Vec6& x : out.platform.x) x -= out.rest;
+  out.base = *base;
   return out;
 }
 
-std::map<std::int64_t, Vec6> basePoses(const Series& series, const BaseMotion& motion) {
+std::map<std::int64_t, Vec6> basePoses(const Series& series, const Motion& base) {
   std::map<std::int64_t, Vec6> out;
   std::optional<std::int64_t> first;
   eachTick(series, [&](const Row& row, double) {
     const std::int64_t tick = row.state.header.sequence;
     if (!first) first = tick;
-    if (const auto x = motion.at(tick - *first)) out[tick] = *x;  // late ticks are missing
+    if (const auto x = base.point(tick - *first)) out[tick] = *x;  // late ticks are missing
   });
   return out;
 }

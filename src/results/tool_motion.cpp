@@ -22,8 +22,8 @@ std::optional<ToolMotion> toolMotion(const Series& series, const std::optional<E
   const Experiment& experiment = series.experiment;
   if (!e || !experiment.robot.tool()) return {};
   ToolMotion out;
-  const std::map<std::int64_t, Vec6> base = basePoses(series, *e);
-  const Vec6 start = e->base.x.front() + e->rest;
+  const std::map<std::int64_t, Vec6> base = basePoses(series, e->base);
+  const Vec6& start = e->base.x.front();
   eachTick(series, [&](const Row& row, double) {
     const auto at = base.find(row.state.header.sequence);
     if (!row.hasTruePose() || at == base.end()) return;

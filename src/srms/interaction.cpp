@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "gsl_errors.hpp"
+#include "ves/kinematics/stewart.hpp"
 #include "ves/math/dense.hpp"
 #include "ves/robot/newton_euler.hpp"
 
@@ -21,8 +22,8 @@ struct FreeDriver {
   void operator()(gsl_odeiv2_driver* d) const { gsl_odeiv2_driver_free(d); }
 };
 
-/// The equations of motion, y = {eta, eta', quaternion of R_IP}, and where there is a world
-/// {p, q, v, w} of what floats in it.
+/// The equations of motion, y = {eta, eta'}, and where there is a world {p, q, v, w} of what floats
+/// in it.
 class Equations {
  public:
   Equations(const Interaction& interaction, const InteractionOptions& options)
@@ -33,9 +34,8 @@ class Equations {
         options_(options) {}
 
   Eigen::Index modes() const { return base_.stiffness.size(); }
-  Eigen::Index attitude() const { return 2 * modes(); }  // of the quaternion, its index
   std::size_t size() const {
-    return static_cast<std::size_t>(attitude() + 4 + (interaction_.world ? kFloating : 0));
+    return static_cast<std::size_t>(2 * modes() + (interaction_.world ? kFloating : 0));
   }
 
   VectorXd start() const {
@@ -43,8 +43,6 @@ class Equations {
     VectorXd y = VectorXd::Zero(static_cast<Eigen::Index>(size()));
     if (options_.eta.size()) y.head(k) = options_.eta;
     if (options_.eta_dot.size()) y.segment(k, k) = options_.eta_dot;
-    const Vec3 turned = base_.Phi.bottomRows<3>() * y.head(k);
-    y.segment<4>(attitude()) = Eigen::Quaterniond(rotation(turned)).coeffs();
     if (interaction_.world) {
       const std::optional<Target>& target = interaction_.world->environment.target;
       const Floating f = target ? target->start : Floating{};
@@ -89,16 +87,12 @@ class Equations {
       const BodyMotion P = platform(y);
       const FrameMotion tool = toolMotion(q, P);
       const Touch touched = touch(interaction_.world->environment, tool, floating(y));
-      right += base_.Phi.transpose() * shift(touched.on_tool_To_I, P.X.p - tool.X.p).stacked();
+      right += jacobian(y).transpose() * shift(touched.on_tool_To_I, P.X.p - tool.X.p).stacked();
       const FloatingRates f =
           rates(interaction_.world->environment, floating(y), touched.on_target_Bo_I);
       dy.tail<kFloating>() << f.p, f.q, f.v, f.w;
     }
     dy.segment(k, k) = solvePositive(A, right);
-    const Vec3 w = base_.Phi.bottomRows<3>() * eta_dot;
-    const Eigen::Quaterniond R_IP(Eigen::Vector4d(y.segment<4>(attitude())));
-    dy.segment<4>(attitude()) =
-        0.5 * (Eigen::Quaterniond(0.0, w.x(), w.y(), w.z()) * R_IP).coeffs();
   }
 
   InteractionPoint point(std::int64_t now, const VectorXd& y) const {
@@ -107,12 +101,8 @@ class Equations {
     p.t = static_cast<double>(now) * kSecondPerNanosecond;
     p.eta = y.head(k);
     p.eta_dot = y.segment(k, k);
-    p.x = base_.Phi * p.eta;
+    p.x = coordinates(y);
     p.x_dot = base_.Phi * p.eta_dot;
-    if (options_.model == InteractionModel::kWhole) {
-      p.R_IP = platform(y).X.R;
-      p.x.tail<3>() = fixedAngles(p.R_IP);
-    }
     if (interaction_.world) {
       p.target = floating(y);
       p.touch =
@@ -133,8 +123,6 @@ class Equations {
     contacts_.see(static_cast<double>(now_) * kSecondPerNanosecond + later, touched(later, y));
   }
 
-  void normalise(VectorXd& y) const { y.segment<4>(attitude()).normalize(); }
-
  private:
   static constexpr int kFloating = 13;
 
@@ -151,14 +139,17 @@ class Equations {
   /// Where P is, and how it moves.
   BodyMotion platform(const VectorXd& y) const {
     const Eigen::Index k = modes();
-    BodyMotion P;
-    P.X.R = Eigen::Quaterniond(Eigen::Vector4d(y.segment<4>(attitude())))
-                .normalized()
-                .toRotationMatrix();
-    P.X.p = interaction_.X_IH.p + base_.Phi.topRows<3>() * y.head(k);
-    P.v = base_.Phi.topRows<3>() * y.segment(k, k);
-    P.w = base_.Phi.bottomRows<3>() * y.segment(k, k);
-    return P;
+    const Vec6 x_dot = base_.Phi * y.segment(k, k);
+    return bodyMotion(interaction_.p_IH, Pose::from(coordinates(y)), x_dot, Vec6::Zero());
+  }
+  Vec6 coordinates(const VectorXd& y) const {
+    return interaction_.rest + base_.Phi * y.head(modes());
+  }
+  /// {v, w} of P per eta'.
+  MatrixXd jacobian(const VectorXd& y) const {
+    MatrixXd J = base_.Phi;
+    J.bottomRows<3>() = angleRateMap(coordinates(y).tail<3>()) * base_.Phi.bottomRows<3>();
+    return J;
   }
   FrameMotion toolMotion(const JointState& q, const BodyMotion& P) const {
     return carriedFrame(robot_.model(), q, P, X_PL0_, interaction_.world->link,
@@ -192,10 +183,11 @@ class Equations {
     const BodyMotion P = platform(y);
     // The wrench is affine in the base's acceleration: this much without, the locked mass with it.
     const Wrench F_Po_P = reaction(q, properMotion(P, X_PL0_, Vec3::Zero()));
-    right += base_.Phi.transpose() * rotate(P.X.R, F_Po_P).stacked();
+    const MatrixXd J = jacobian(y);
+    right += J.transpose() * rotate(P.X.R, F_Po_P).stacked();
     const Mat6 M_1 = spatialMass(
         rotated(P.X.R, combine(RigidBody{}, X_PL0_, compositeBody(robot_.model(), q.q))));
-    A = MatrixXd::Identity(k, k) + base_.Phi.transpose() * M_1 * base_.Phi;
+    A = MatrixXd::Identity(k, k) + J.transpose() * M_1 * J;
   }
 
   const Interaction& interaction_;
@@ -312,7 +304,6 @@ std::vector<InteractionPoint> simulate(const Interaction& interaction,
             "too small a tolerance is asked");
       now = until;
     }
-    equations.normalise(y);
   }
   return out;
 }

@@ -170,7 +170,7 @@ void LiveRun::requestStop(std::int64_t edition) {
 std::string LiveRun::picture() const {
   if (!row_ || !scene_) return {};
   std::optional<Vec6> base;
-  if (base_) base = base_->at(row_->state.header.sequence - let_go_->tick);
+  if (base_) base = base_->point(row_->state.header.sequence - let_go_->tick);
   std::vector<float> numbers = scene_->picture(*row_, base);
   numbers.push_back(static_cast<float>(rate_));
   numbers.push_back(!stop_ ? 0.0f : stop_->taken ? 2.0f : 1.0f);

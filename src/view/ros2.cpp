@@ -242,7 +242,7 @@ class McapExport::Impl {
     std::vector<Stamped> moving = {{"inertial", "platform", X_IP}};
     robotFrames(q, true, "", moving);
     if (const auto base =
-            base_ ? base_->at(row.state.header.sequence - base_start_) : std::nullopt) {
+            base_ ? base_->point(row.state.header.sequence - base_start_) : std::nullopt) {
       moving.push_back({"inertial", "ghost/platform", geometry.fromHome(Pose::from(*base))});
       robotFrames(q, true, "ghost/", moving);
     }
@@ -325,7 +325,7 @@ class McapExport::Impl {
   Identity controller_;     // whose run it is
   std::int64_t tick_ = -1;  // the last
   ReferenceMotions references_;
-  std::optional<BaseMotion> base_;
+  std::optional<Motion> base_;
   std::int64_t base_start_ = -1;  // tick
   int base_segment_ = -1;
   std::map<std::string, std::pair<std::uint16_t, LcmDefinition>> own_;  // by LCM channel

@@ -360,7 +360,7 @@ nlohmann::ordered_json recording(const Series& series, double rate,
   const Scene scene(series.experiment);
   warnings.insert(warnings.end(), scene.warnings().begin(), scene.warnings().end());
   const std::optional<Emulation> emulated = emulation(series);
-  const auto base = emulated ? basePoses(series, *emulated) : std::map<std::int64_t, Vec6>();
+  const auto base = emulated ? basePoses(series, emulated->base) : std::map<std::int64_t, Vec6>();
   std::vector<float> numbers;
   double next = -HUGE_VAL;
   for (const Row& row : series.rows) {

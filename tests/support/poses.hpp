@@ -72,7 +72,7 @@ struct Swing {
     return -amplitude.array() * w.array().square() * (w.array() * t + phase.array()).sin();
   }
   BodyMotion motion(double t) const {
-    return bodyMotion(geometry(), Pose::from(x(t)), xDot(t), xDdot(t));
+    return bodyMotion(geometry().home(), Pose::from(x(t)), xDot(t), xDdot(t));
   }
 };
 

@@ -17,7 +17,7 @@ struct Proposal {
 
 /// (C.11), (C.12), with rates (2.25) and accelerations (2.31).
 inline Proposal inverseKinematics(const Geometry& geometry, const Waypoint<6>& x) noexcept {
-  const BodyMotion P = bodyMotion(geometry, Pose::from(x.x), x.x_dot, x.x_ddot);
+  const BodyMotion P = bodyMotion(geometry.home(), Pose::from(x.x), x.x_dot, x.x_ddot);
   return {x, P.X, legMotion(geometry, P)};
 }
 

@@ -19,14 +19,12 @@ struct Geometry {
   std::array<Vec3, kLegs> p_PPi_P{};  // [m] platform joints
   double home_height = 0.0;           // [m] z of P in I at the home pose
 
+  /// Where P is in I at the home pose.
+  Vec3 home() const { return {0.0, 0.0, home_height}; }
   /// X_IP of coordinates counted from the home pose.
-  Transform fromHome(const Pose& x) const {
-    return {rotation(x.rpy), x.p + Vec3(0.0, 0.0, home_height)};
-  }
+  Transform fromHome(const Pose& x) const { return {rotation(x.rpy), x.p + home()}; }
   /// Coordinates of X_IP counted from the home pose.
-  Pose toHome(const Transform& X_IP) const {
-    return {X_IP.p - Vec3(0.0, 0.0, home_height), fixedAngles(X_IP.R)};
-  }
+  Pose toHome(const Transform& X_IP) const { return {X_IP.p - home(), fixedAngles(X_IP.R)}; }
 };
 
 /// Lengths with their first two derivatives.
@@ -42,8 +40,9 @@ Vec6 legLengths(const Geometry& geometry, const Transform& X_IP) noexcept;
 /// Lengths, rates (2.25) and accelerations (2.31) for a moving platform.
 LegMotion legMotion(const Geometry& geometry, const BodyMotion& P) noexcept;
 
-/// Motion of P from coordinates about home and their derivatives; (2.27), (2.33) in inertial axes.
-BodyMotion bodyMotion(const Geometry& geometry, const Pose& x, const Vec6& x_dot,
+/// Motion of P from coordinates about p_IH [m], where P is at home, and their derivatives; (2.27),
+/// (2.33) in inertial axes.
+BodyMotion bodyMotion(const Vec3& p_IH, const Pose& x, const Vec6& x_dot,
                       const Vec6& x_ddot) noexcept;
 
 enum class SolveStatus {

@@ -22,6 +22,9 @@ struct Motion {
   // Of the base in free space, where there is something to touch:
   std::vector<double> on_tool;  // [N] of what it touches or grips
   std::vector<Contact> contacts;
+
+  /// x of its point so many after the first; none before and beyond.
+  std::optional<Vec6> point(std::int64_t after) const;
 };
 
 /// Admittance control runs in this tick.
@@ -50,18 +53,10 @@ Distance distance(const Motion& a, const Motion& b);
 /// Of a motion from where it began.
 Distance travel(const Motion& motion);
 
-/// The robot on its base in free space (SRMS-robot, nothing left out).
-struct BaseMotion {
-  Motion base;
-  Vec6 rest = Vec6::Zero();  // [m, rad] of the pose at its start, what the modes do not express
-
-  /// From home [m, rad], so many ticks after the start; none when it is over.
-  std::optional<Vec6> at(std::int64_t tick) const;
-};
-
 /// What an emulation did, and what it is for.
-struct Emulation : BaseMotion {
-  Motion platform;  // in the first admittance segment, without `rest`
+struct Emulation {
+  Motion base;      // the robot on its base in free space (SRMS-robot, nothing left out)
+  Motion platform;  // in the first admittance segment
 };
 
 /// The base's motions that were needed last, for several threads. Runs that differ in noise, gains
@@ -91,11 +86,12 @@ class ReferenceMotions {
   std::atomic<int> computed_ = 0;
 };
 
-/// In the first admittance segment of the program, let go at `start` from home. None without
+/// The robot on its base in free space, in the first admittance segment of the program, let go at
+/// `start` from home: a point a tick. None without
 /// admittance control, where so many modes are kept that it would take longer than the run, and
 /// where the motion grows without bound.
-std::optional<BaseMotion> baseMotion(const Experiment& experiment, const Vec6& start,
-                                     ReferenceMotions& references);
+std::optional<Motion> baseMotion(const Experiment& experiment, const Vec6& start,
+                                 ReferenceMotions& references);
 
 /// The same from where the platform was let go, beside what it did. None of a run without two ticks
 /// of it.
@@ -103,7 +99,7 @@ std::optional<Emulation> emulation(const Series& series, ReferenceMotions& refer
 std::optional<Emulation> emulation(const Series& series);
 
 /// Where the base would be, from home [m, rad], by the tick that it is for.
-std::map<std::int64_t, Vec6> basePoses(const Series& series, const BaseMotion& motion);
+std::map<std::int64_t, Vec6> basePoses(const Series& series, const Motion& base);
 
 /// A mode of base and robot together, the robot's joints locked.
 struct CoupledMode {

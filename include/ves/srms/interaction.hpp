@@ -7,8 +7,10 @@
 //   split   (3.11), the report's: the wrench of the moving robot on a fixed base, and the locked
 //           robot's mass on the moving one. Small angles; of the base's rates only the centripetal
 //           term is kept.
-//   whole   Newton-Euler of the moving robot on the moving base, nothing left out. Phi_l eta' is
-//           the base's angular velocity, and its attitude is integrated beside the modes.
+//   whole   Newton-Euler of the moving robot on the moving base, nothing left out. As in the
+//           emulation, x = Phi eta are position and fixed angles (2.19) however far the base turns;
+//           the wrench does its work on the modes through the Jacobian of these angles, so that
+//           energy is conserved. For small angles that is Phi^T F (C.4).
 #pragma once
 
 #include <cstdint>
@@ -36,7 +38,8 @@ struct Interaction {
   JointVector q0 = JointVector::Zero();  // [rad | m]
   std::vector<TimedAction> actions;      // of the robot, by time
   std::optional<World> world;            // what its tool touches
-  Transform X_IH;                        // where P is in I when the base is at x = 0
+  Vec3 p_IH = Vec3::Zero();              // [m] where P is in I when the base is at x = 0
+  Vec6 rest = Vec6::Zero();              // [m, rad] of x, beside the modes
 
   bool operator==(const Interaction&) const = default;
 };
@@ -57,11 +60,10 @@ struct InteractionOptions {
 /// The base at one time.
 struct InteractionPoint {
   double t = 0.0;             // [s]
-  Vec6 x = Vec6::Zero();      // [m, rad] Phi eta (3.13a); of the whole model the attitude's angles
+  Vec6 x = Vec6::Zero();      // [m, rad] rest + Phi eta (3.13a)
   Vec6 x_dot = Vec6::Zero();  // [m/s, rad/s] Phi eta'
   Eigen::VectorXd eta, eta_dot;
-  Mat3 R_IP = Mat3::Identity();  // whole model only
-  Touch touch;                   // where there is a world
+  Touch touch;  // where there is a world
   Floating target;
   ContactWatch contacts;  // up to now
 };

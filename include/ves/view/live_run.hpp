@@ -62,8 +62,8 @@ class LiveRun : public LiveSource {
   std::int64_t edition_ = 0;
   std::int64_t asked_ = 0;  // [ns]
 
-  std::future<std::optional<BaseMotion>> computing_;
-  std::optional<BaseMotion> base_;
+  std::future<std::optional<Motion>> computing_;
+  std::optional<Motion> base_;
   struct LetGo {
     std::int64_t tick;
     Vec6 x;  // [m, rad] from home
