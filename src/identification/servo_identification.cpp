@@ -77,8 +77,8 @@ ServoEstimate fit(const ServoModel& nominal, double period, double phase, const 
                                 " moves too little to tell gains, lag and delay apart");
       out.residual(leg) = std::sqrt(squares / static_cast<double>(n));
       if (turn == kTurns) {
-        // What the model does not foretell comes from counts and lasts: not each tick's by itself,
-        // but each block's (the sandwich estimator of clusters).
+        // Residuals are correlated over many ticks, because counts are rounded and the model runs
+        // by itself: the covariance is taken from sums over blocks (clustered sandwich estimator).
         const Eigen::Matrix<double, 4, kBlocks> by_block =
             size.asDiagonal() * solvePositive(scaled, size.asDiagonal() * Je);
         const Parameters deviation =

@@ -23,7 +23,7 @@ struct Motion {
   std::vector<double> on_tool;  // [N] of what it touches or grips
   std::vector<Contact> contacts;
 
-  /// x of its point so many after the first; none before and beyond.
+  /// x, `after` points after the first one; none outside the motion.
   std::optional<Vec6> point(std::int64_t after) const;
 };
 
@@ -87,9 +87,8 @@ class ReferenceMotions {
 };
 
 /// The robot on its base in free space, in the first admittance segment of the program, let go at
-/// `start` from home: a point a tick. None without
-/// admittance control, where so many modes are kept that it would take longer than the run, and
-/// where the motion grows without bound.
+/// `start` from home: a point a tick. None without admittance control, where so many modes are kept
+/// that it would take longer than the run, and where the motion grows without bound.
 std::optional<Motion> baseMotion(const Experiment& experiment, const Vec6& start,
                                  ReferenceMotions& references);
 

@@ -8,9 +8,9 @@
 //           robot's mass on the moving one. Small angles; of the base's rates only the centripetal
 //           term is kept.
 //   whole   Newton-Euler of the moving robot on the moving base, nothing left out. As in the
-//           emulation, x = Phi eta are position and fixed angles (2.19) however far the base turns;
-//           the wrench does its work on the modes through the Jacobian of these angles, so that
-//           energy is conserved. For small angles that is Phi^T F (C.4).
+//           emulation, x = rest + Phi eta are position and fixed angles (2.19) however far the base
+//           turns; the wrench does its work on the modes through the Jacobian of these angles, so
+//           that energy is conserved. For small angles that is Phi^T F (C.4).
 #pragma once
 
 #include <cstdint>
@@ -39,7 +39,7 @@ struct Interaction {
   std::vector<TimedAction> actions;      // of the robot, by time
   std::optional<World> world;            // what its tool touches
   Vec3 p_IH = Vec3::Zero();              // [m] where P is in I when the base is at x = 0
-  Vec6 rest = Vec6::Zero();              // [m, rad] of x, beside the modes
+  Vec6 rest = Vec6::Zero();  // [m, rad] constant part of x, which the modes do not express
 
   bool operator==(const Interaction&) const = default;
 };
