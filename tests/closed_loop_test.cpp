@@ -116,6 +116,36 @@ TEST_F(ClosedLoop, ZSineErrsAsTheServosGainsAndDelaysSay) {  // 4.2.1
   EXPECT_NEAR(retracting, 53.7e-3 + delay, 1.5e-3);
 }
 
+TEST_F(ClosedLoop, TrackingIsJudgedByWhatBelongsTogether) {
+  const Series whole = run(experiment("z_sine"));
+  const auto delay = [&](const Series& series) {
+    return summarise(series, result_)["tracking_delay_s"].get<double>();
+  };
+  const double due = delay(whole);
+  EXPECT_GT(due, 0.03);
+  // Its second half as a segment of its own, a metre away: the jump is nobody's motion.
+  Series two = whole;
+  for (std::size_t n = two.rows.size() / 2; n < two.rows.size(); ++n) {
+    Row& row = two.rows[n];
+    ++row.state.segment;
+    row.state.x_desired[2] += 1.0;
+    row.truth.x[2] += 1.0;
+  }
+  EXPECT_NEAR(delay(two), due, 1e-3);
+  // Every second tick is lost: what is left is nowhere long enough, and nothing is said of it.
+  Series lossy = whole;
+  std::erase_if(lossy.rows, [](const Row& row) { return row.state.header.sequence % 2 != 0; });
+  EXPECT_FALSE(summarise(lossy, result_).contains("tracking_delay_s"));
+}
+
+TEST_F(ClosedLoop, APlatformWithSixEqualRatesIsNotStill) {
+  Series series = run(
+      experiment("z_sine", {"program=[{move: {}}, {calibration: {}}, {move: {duration_s: 2}}]"}));
+  EXPECT_TRUE(summarise(series, result_).contains("dynamic_force_max_still_n"));
+  for (Row& row : series.rows) std::fill_n(row.state.x_dot, 6, 0.01);
+  EXPECT_FALSE(summarise(series, result_).contains("dynamic_force_max_still_n"));
+}
+
 /// The conditioner's filter by Runge-Kutta, driven by straight lines: nothing of ours in it.
 class SecondOrderFilter {
  public:

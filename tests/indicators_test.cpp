@@ -61,10 +61,12 @@ TEST(TrackingIndicators, KnowADelayOfManyFrequencies) {
 TEST(TrackingIndicators, SayNothingOfWhatStandsOrIsShort) {
   const TrackingIndicators still =
       trackingIndicators({{std::vector<double>(500, 0.1), std::vector<double>(500, 0.2)}}, kPeriod);
+  EXPECT_EQ(still.points, 0u);
   EXPECT_EQ(still.delay, 0.0);
   EXPECT_EQ(still.paei_amplitude, 1.0);
   const TrackedMotion m = sines({0.5}, 0.1, 1.0);
   const TrackedMotion few = {{m.u.begin(), m.u.begin() + 20}, {m.y.begin(), m.y.begin() + 20}};
+  EXPECT_EQ(trackingIndicators({few}, kPeriod).points, 0u);
   EXPECT_EQ(trackingIndicators({few}, kPeriod).delay, 0.0);
   EXPECT_EQ(trackingIndicators({}, kPeriod).delay, 0.0);
 }
@@ -81,6 +83,7 @@ TEST(TrackingIndicators, OfSeveralMotionsAreThoseOfEach) {
   elsewhere.y.resize(1000);
   const TrackedMotion scrap = {{one.u.begin(), one.u.begin() + 20}, std::vector<double>(20, 3.0)};
   const TrackingIndicators t = trackingIndicators({one, elsewhere, scrap}, kPeriod);
+  EXPECT_EQ(t.points, 3000u);
   EXPECT_NEAR(t.paei_amplitude, 1.2, 1e-6);
   EXPECT_NEAR(t.paei_phase, 2.0 * M_PI * f * tau, 1e-6);
   EXPECT_NEAR(t.fdb_amplitude, 1.2, 1e-6);

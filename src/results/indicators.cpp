@@ -75,11 +75,12 @@ TrackingIndicators trackingIndicators(std::vector<TrackedMotion> motions, double
   TrackingIndicators out;
   const auto most = static_cast<std::ptrdiff_t>(kMostDelay / period);
   std::erase_if(motions, [&](const TrackedMotion& m) { return std::ssize(m.u) < 4 * most; });
-  double n = 0.0, uu = 0.0, yy = 0.0, uy = 0.0, turn = 0.0;
+  std::size_t points = 0;
+  double uu = 0.0, yy = 0.0, uy = 0.0, turn = 0.0;
   for (TrackedMotion& m : motions) {
     removeMean(m.u);
     removeMean(m.y);
-    n += static_cast<double>(m.u.size());
+    points += m.u.size();
     for (std::size_t i = 0; i < m.u.size(); ++i) {
       uu += m.u[i] * m.u[i];
       yy += m.y[i] * m.y[i];
@@ -88,8 +89,9 @@ TrackingIndicators trackingIndicators(std::vector<TrackedMotion> motions, double
     }
   }
   constexpr double kStill = 1e-12;  // [m], [rad]
-  const double still = n * kStill * kStill;
+  const double n = static_cast<double>(points), still = n * kStill * kStill;
   if (!(uu > still && yy > still)) return out;
+  out.points = points;
   out.rms = std::sqrt(apart(motions, 0) * n / uu);
   out.paei_amplitude = std::sqrt(yy / uu);
   out.paei_phase = std::copysign(std::acos(std::clamp(uy / std::sqrt(uu * yy), -1.0, 1.0)), turn);

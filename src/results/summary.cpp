@@ -102,6 +102,7 @@ void addIndicators(const Series& series, nlohmann::ordered_json& out) {
   if (!(range.maxCoeff(&most) > kMoved)) return;
   const TrackingIndicators t =
       trackingIndicators(std::move(segments[most]), series.experiment.controller.periodSeconds());
+  if (t.points == 0) return;
   out["tracking_coordinate"] = coordinate(most).name;
   out["tracking_delay_s"] = t.delay;
   out["tracking_rms"] = t.rms;

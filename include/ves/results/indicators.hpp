@@ -14,6 +14,7 @@ struct TrackedMotion {
 
 /// Of y beside u, what it should be; without their means.
 struct TrackingIndicators {
+  std::size_t points = 0;  // [-] of what was compared; 0: too short or nothing moved, all as below
   double delay = 0.0;  // [s] by which u has to be moved to lie closest to y, at most half a second
   double rms = 0.0;    // [-] of y - u, by the rms of u
   // Phase and amplitude error indices (Mirza Hessabi and Mercan 2012, Earthquake Engng. Struct.
