@@ -117,7 +117,10 @@ TEST_F(ClosedLoop, ZSineErrsAsTheServosGainsAndDelaysSay) {  // 4.2.1
 }
 
 TEST_F(ClosedLoop, TrackingIsJudgedByWhatBelongsTogether) {
-  const Series whole = run(experiment("z_sine"));
+  const Series whole = run(experiment(
+      "z_sine", {"program=[{move: {}}, {trajectory: {duration_s: 12, z: {sine: {amplitude_m: 0.1, "
+                 "frequency_hz: 0.5}}}}]"}));
+  ASSERT_TRUE(result_.good());
   const auto delay = [&](const Series& series) {
     return summarise(series, result_)["tracking_delay_s"].get<double>();
   };
