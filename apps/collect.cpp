@@ -7,9 +7,9 @@
 
 #include "app.hpp"
 #include "commands.hpp"
+#include "ves/bus/channels.hpp"
 #include "ves/results/series.hpp"
 #include "ves/run/follow_bus.hpp"
-#include "ves/transport/channels.hpp"
 #include "ves/view/ros2.hpp"
 
 namespace ves::app {
@@ -57,7 +57,7 @@ int collectCommand(int argc, char** argv) {
   cli.add_option("log", log, "LCM event log of a run");
   cli.add_option("--select", select,
                  "columns, or beginnings of their names: z_ fx_dynamic; all by default");
-  cli.add_flag("--list", list, "only the names of the columns");
+  cli.add_flag("--list", list, "only the names of the columns, and what they mean");
   cli.add_option("--rate", rate, "[Hz] rows per second; every tick by default")
       ->check(inRange(1e-6, 1e6));
   cli.add_option("--from", from, "[s] since the first tick")->check(inRange(0.0, 1e9));
@@ -90,7 +90,8 @@ int collectCommand(int argc, char** argv) {
     }
     std::ostream& to = out.empty() ? std::cout : file;
     if (list) {
-      for (const Column& column : chosen) to << column.name << "\n";
+      for (const Column& column : chosen)
+        to << fmt::format("{:<36} {}\n", column.name, column.meaning);
     } else {
       to << csvHeader(chosen) << "\n";
       double next = from;

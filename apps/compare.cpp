@@ -5,7 +5,7 @@
 
 #include "app.hpp"
 #include "commands.hpp"
-#include "ves/base/coordinates.hpp"
+#include "ves/core/coordinates.hpp"
 #include "ves/results/differences.hpp"
 #include "ves/validation/page.hpp"
 

@@ -4,9 +4,9 @@
 #include "ves/doctor/conform.hpp"
 #include "app.hpp"
 #include "commands.hpp"
+#include "ves/bus/channels.hpp"
 #include "ves/realtime/realtime.hpp"
 #include "ves/run/announcer.hpp"
-#include "ves/transport/channels.hpp"
 
 namespace ves::app {
 namespace {
@@ -18,9 +18,10 @@ constexpr std::int64_t kHello = 100'000'000;           // [ns] between commands 
 std::vector<Requirement> listen(const Experiment& experiment, const std::string& url,
                                 double seconds) {
   const Identity self = Identity::draw();
-  const setup_t setup = setupOf(experiment, false, header(self, 0, 0));
+  const MachineSetup told = setupOf(experiment, false);
+  const setup_t setup = toMessage(told, header(self, 0, 0));
   Bus bus(url);
-  Announcer announcer(bus, url, describe(experiment, self, 0), setup);
+  Announcer announcer(bus, url, describe(experiment, self, 0), told);
   std::optional<SampleJudge> judge;
   const std::int64_t start = monotonicNow();
   bus.subscribe({channel::kSample}, [&](const std::string&, const void* data, std::uint32_t size) {
@@ -76,7 +77,7 @@ Requirement silence(const Experiment& experiment, const std::string& url) {
   constexpr double kStill = 2.0;       // [count]
   const std::int64_t period = experiment.controller.period;
   const Identity self = Identity::draw();
-  const setup_t setup = setupOf(experiment, false, header(self, 0, 0));
+  const MachineSetup setup = setupOf(experiment, false);
   Bus bus(url);
   Announcer announcer(bus, url, describe(experiment, self, 0), setup);
   ControllerLink link(bus, self);
@@ -102,14 +103,14 @@ Requirement silence(const Experiment& experiment, const std::string& url) {
   for (std::int32_t& count : command.counts) count += kAhead;
   run(command, kTicks);
   const double followed = apart(command.rest);
-  const std::int64_t until = monotonicNow() + setup.hold_after_ns + 1'000'000'000;
+  const std::int64_t until = monotonicNow() + setup.watchdog.hold_after + 1'000'000'000;
   while (monotonicNow() < until && !stop_requested) bus.wait(20);
   bus.drain();
   const double off = apart(command.rest);
   run({}, 3);
   return {"silence",
           fmt::format("rests at `rest` after {:.0f} ms without a command",
-                      static_cast<double>(setup.hold_after_ns) * 1e-6),
+                      static_cast<double>(setup.watchdog.hold_after) * 1e-6),
           fmt::format("{:.0f} counts from it, of {:.0f} that it was led away", off, followed),
           off <= kStill && followed > 0.5 * kAhead};
 }

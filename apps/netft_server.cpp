@@ -5,10 +5,10 @@
 
 #include "app.hpp"
 #include "commands.hpp"
+#include "ves/bus/channels.hpp"
+#include "ves/bus/event_log.hpp"
 #include "ves/devices/net_ft_server.hpp"
 #include "ves/realtime/realtime.hpp"
-#include "ves/transport/channels.hpp"
-#include "ves/transport/event_log.hpp"
 
 namespace ves::app {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "app.hpp"
 #include "commands.hpp"
-#include "ves/base/coordinates.hpp"
+#include "ves/core/coordinates.hpp"
 #include "ves/plant/nominal_servo.hpp"
 
 namespace ves::app {

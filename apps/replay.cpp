@@ -4,7 +4,7 @@
 #include "ves/run/replay.hpp"
 #include "app.hpp"
 #include "commands.hpp"
-#include "ves/base/build.hpp"
+#include "ves/core/build.hpp"
 
 namespace ves::app {
 

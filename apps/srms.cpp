@@ -7,8 +7,8 @@
 
 #include "app.hpp"
 #include "commands.hpp"
-#include "ves/base/coordinates.hpp"
 #include "ves/config/base.hpp"
+#include "ves/core/coordinates.hpp"
 
 namespace ves::app {
 namespace {

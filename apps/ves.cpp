@@ -7,7 +7,7 @@
 #include "app.hpp"
 
 #include "commands.hpp"
-#include "ves/base/build.hpp"
+#include "ves/core/build.hpp"
 
 namespace ves::app {
 namespace {

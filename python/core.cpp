@@ -11,11 +11,11 @@
 
 #include "ves/analysis/appendix_e.hpp"
 #include "ves/analysis/gate.hpp"
-#include "ves/base/build.hpp"
 #include "ves/config/base.hpp"
 #include "ves/config/experiment.hpp"
 #include "ves/config/platform.hpp"
 #include "ves/control/gravity_compensation.hpp"
+#include "ves/core/build.hpp"
 #include "ves/math/second_order.hpp"
 #include "ves/results/series.hpp"
 #include "ves/robot/newton_euler.hpp"

@@ -30,7 +30,7 @@ TEST_P(CalibrationOf, RecoversTheBiasToWithinItsStandardError) {
     rig.arm();
     rig.order(Request::kRun, segment(SegmentKind::kCalibration));
     const TickState& s = rig.until(Phase::kArmed);
-    ASSERT_EQ(s.calibration, Calibration::Status::kDone);
+    ASSERT_EQ(s.calibration, CalibrationStatus::kDone);
     const Vec6 normalised = (s.bias - trueBias(e)).cwiseQuotient(s.standard_error);
     EXPECT_LT(normalised.cwiseAbs().maxCoeff(), 8.0) << seed;
     sum += normalised.squaredNorm();
@@ -61,7 +61,7 @@ TEST_P(CalibrationIsRefused, WithTheEvidence) {
   GetParam().before(rig);
   const Vec6 bias = rig.order(Request::kRun, segment(SegmentKind::kCalibration)).bias;
   const TickState& s = rig.until(Phase::kArmed);
-  EXPECT_EQ(s.calibration, Calibration::Status::kRefused);
+  EXPECT_EQ(s.calibration, CalibrationStatus::kRefused);
   EXPECT_EQ(s.violation, GetParam().violation);
   EXPECT_EQ(s.violation_index, GetParam().index);
   EXPECT_GT(s.violation_amount, 0.0);
@@ -91,7 +91,7 @@ TEST(Calibration, WaitsForTheRobotToComeToRest) {
   rig.plant().moveRobot(RobotMove{1, -1.0, 1.5});
   rig.order(Request::kRun, segment(SegmentKind::kCalibration));
   const TickState& s = rig.until(Phase::kArmed);
-  EXPECT_EQ(s.calibration, Calibration::Status::kDone);
+  EXPECT_EQ(s.calibration, CalibrationStatus::kDone);
   EXPECT_EQ(s.violation, StillnessViolation::kJoint);
   EXPECT_LT((s.bias - trueBias(e)).cwiseQuotient(s.standard_error).cwiseAbs().maxCoeff(), 8.0);
 }

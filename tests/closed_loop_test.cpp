@@ -12,6 +12,7 @@
 #include <iterator>
 
 #include "support/rig.hpp"
+#include "ves/run/announcer.hpp"
 #include "ves/results/series.hpp"
 #include "ves/results/summary.hpp"
 #include "ves/results/tool_motion.hpp"
@@ -303,7 +304,7 @@ TEST_F(ClosedLoop, AProgramThatEndsEarlySaysWhy) {
 TEST_F(ClosedLoop, TheSetupIsAllThatADriverNeeds) {
   // Counts, lengths and wrenches of a run, once more with nothing but the message.
   const Experiment e = experiment("puma_on_table_4_1");
-  const setup_t setup = setupOf(e, true, header({1, 1}, 0, 0));
+  const setup_t setup = toMessage(setupOf(e, true), header({1, 1}, 0, 0));
   const Series series = run(e);
   EXPECT_EQ(setup.period_ns, 10'000'000);
   EXPECT_EQ(setup.lockstep, 1);

@@ -161,9 +161,8 @@ TEST(Admittance, BeginsWithoutAPauseWhateverShareOfTheCompensationIsIn) {
 
 // What the legs do when nobody commands
 
-using plant::LegWatchdog;
 constexpr std::int64_t kMs = 1'000'000;  // [ns]
-constexpr plant::Watchdog kTimes{30 * kMs, 1000 * kMs, 2000 * kMs};
+constexpr Watchdog kTimes{30 * kMs, 1000 * kMs, 2000 * kMs};
 constexpr LegCounts kHome = {1000, 1000, 1000, 1000, 1000, 1000};
 
 LegCounts all(std::int32_t count) {
@@ -172,7 +171,12 @@ LegCounts all(std::int32_t count) {
   return out;
 }
 LegCommand command(std::int32_t counts, std::int32_t rest, bool park = true) {
-  return {true, all(counts), all(rest), 0, -1, park};
+  LegCommand out;
+  out.engaged = true;
+  out.counts = all(counts);
+  out.rest = all(rest);
+  out.park = park;
+  return out;
 }
 
 TEST(LegWatchdog, FollowsThenRestsAtTheCheckedLengthsThenGoesHome) {

@@ -299,7 +299,7 @@ TEST_F(Emulation, AnAidedWrenchComesInAndGoesOutWithTheCompensation) {
     const Vec6 should =
         s.withholds ? measured + s.compensation_share * (reaction - measured) : measured;
     ASSERT_LT((s.dynamic.stacked() - should).norm(), 1e-9) << s.tick;
-    EXPECT_TRUE(!s.withholds || s.calibration == Calibration::Status::kDone) << s.tick;
+    EXPECT_TRUE(!s.withholds || s.calibration == CalibrationStatus::kDone) << s.tick;
     between += s.withholds && s.compensation_share > 0.1 && s.compensation_share < 0.9;
     // The bias has just been found: what was measured beyond another one does not count.
     if (admitted(s) && i < 230) withheld += s.withholds;

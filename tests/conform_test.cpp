@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // A machine that keeps all requirements of docs/machine.md, and one for each that breaks it.
+#include "ves/run/announcer.hpp"
 #include "ves/doctor/conform.hpp"
 
 #include <gtest/gtest.h>
@@ -10,7 +11,7 @@
 
 #include "support/programs.hpp"
 #include "support/rig.hpp"
-#include "ves/transport/bus.hpp"
+#include "ves/bus/bus.hpp"
 
 namespace ves {
 namespace {
@@ -18,7 +19,7 @@ namespace {
 using Names = std::set<std::string>;
 
 setup_t setup() {
-  return setupOf(test::experiment("puma_on_table_4_1"), false, header({1, 1}, 0, 0));
+  return toMessage(setupOf(test::experiment("puma_on_table_4_1"), false), header({1, 1}, 0, 0));
 }
 
 /// Two seconds of a good machine at `rate`, spoilt sample by sample; what is not kept. `spoil` may

@@ -5,12 +5,13 @@
 
 #include "support/refusal.hpp"
 #include "support/rig.hpp"
+#include "ves/run/truth.hpp"
+#include "ves/bus/messages.hpp"
 #include "ves/config/experiment.hpp"
 #include "ves/plant/plant.hpp"
 #include "ves/results/contacts.hpp"
 #include "ves/results/summary.hpp"
 #include "ves/srms/interaction.hpp"
-#include "ves/transport/messages.hpp"
 
 namespace ves {
 namespace {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // Pieces of the machine that are real: a Net F/T sensor, drivers on the bus, other hosts' clocks.
+#include "ves/run/announcer.hpp"
 #include "ves/devices/machine.hpp"
 
 #include <gtest/gtest.h>
@@ -13,11 +14,11 @@
 #include "support/rdt_sensor.hpp"
 #include "support/refusal.hpp"
 #include "support/rig.hpp"
+#include "ves/bus/channels.hpp"
 #include "ves/devices/net_ft.hpp"
 #include "ves/devices/net_ft_server.hpp"
 #include "ves/devices/on_bus.hpp"
 #include "ves/realtime/realtime.hpp"
-#include "ves/transport/channels.hpp"
 
 namespace ves::devices {
 namespace {
@@ -490,7 +491,7 @@ class Composed : public testing::Test {
 
 TEST_F(Composed, EachPieceComesFromItsDriverAndTheRestIsSimulated) {
   const Experiment alone = test::experiment("puma_on_table_4_1");
-  const setup_t setup = setupOf(alone, false, header({1, 1}, 0, 0));
+  const setup_t setup = toMessage(setupOf(alone, false), header({1, 1}, 0, 0));
   plant::Plant simulated(alone.plant);
   const Sample rest = simulated.sample();
   const auto composed = [&](const std::string& piece, const std::string& channel) {
@@ -653,8 +654,7 @@ class ComposedRun : public test::Programs {
 
 TEST_F(ComposedRun, ParksOnLegsOfTheCppTemplate) {
   enterPrivateBus();
-  Process legs(std::string(VES_TEST_APP_DIR) + "/examples/legs_driver",
-               {std::string(VES_TEST_CONFIG_DIR) + "/scenarios/z_sine.yaml"});
+  Process legs(std::string(VES_TEST_APP_DIR) + "/examples/legs_driver", {});
   parks({"machine.legs=external"});
   // The controller measures what these legs did; nobody knows a truth.
   EXPECT_GT(summary(folder_ / "run")["ticks"].get<int>(), 300);

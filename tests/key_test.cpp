@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // A bus with a key: what is forged, altered, moved or replayed is nobody's.
-#include "ves/transport/key.hpp"
+#include "ves/bus/key.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -146,7 +146,7 @@ sample_t sample(const Identity& machine, std::int64_t sequence, std::int64_t ans
   s.time = monotonicNow();
   s.legs_time = s.wrench_time = s.joints_time = s.time;
   s.legs.fill(8000);
-  sample_t m = toMessage(s, machine, -1);
+  sample_t m = toMessage(s, machine);
   m.command_source = answers_to;
   return m;
 }

@@ -7,9 +7,9 @@
 #include <gtest/gtest.h>
 
 #include "support/rig.hpp"
-#include "ves/control/leg_communication.hpp"
+#include "ves/contract/leg_communication.hpp"
 #include "ves/plant/nominal_servo.hpp"
-#include "ves/simulation/one_leg.hpp"
+#include "ves/plant/one_leg.hpp"
 
 namespace ves::plant {
 namespace {

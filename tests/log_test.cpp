@@ -13,10 +13,10 @@
 
 #include "support/refusal.hpp"
 #include "support/rig.hpp"
+#include "ves/bus/channels.hpp"
+#include "ves/bus/event_log.hpp"
 #include "ves/results/series.hpp"
 #include "ves/run/run.hpp"
-#include "ves/transport/channels.hpp"
-#include "ves/transport/event_log.hpp"
 
 namespace ves {
 namespace {
@@ -41,7 +41,7 @@ class Log : public testing::Test {
     for (int i = 0; i < 5; ++i) {
       Sample s = restingSample();
       s.sequence = i;
-      writer.write(channel::kSample, toMessage(s, {1, 2}, i), 1'000'000LL * i);
+      writer.write(channel::kSample, toMessage(s, {1, 2}), 1'000'000LL * i);
     }
   }
   void TearDown() override { fs::remove(file_); }
@@ -167,7 +167,7 @@ TEST_F(Log, AFullDiskLosesWholeEventsAndKeepsTheFileWhole) {
     for (int i = 0; i < 1000; ++i) {
       Sample s = restingSample();
       s.sequence = i;
-      writer.write(channel::kSample, toMessage(s, {1, 2}, i), 10'000'000LL * i);
+      writer.write(channel::kSample, toMessage(s, {1, 2}), 10'000'000LL * i);
       if (writer.lost() == 0) written = i + 1;
     }
     writer.flush();
@@ -190,7 +190,7 @@ TEST_F(Log, AnEventReachesTheFileWithinHalfASecondOfLaterOnes) {  // a kill take
   for (int i = 0; i <= 500; ++i) {
     Sample s = restingSample();
     s.sequence = i;
-    writer.write(channel::kSample, toMessage(s, {1, 2}, i), 1'000'000'000'000 + 10'000'000LL * i);
+    writer.write(channel::kSample, toMessage(s, {1, 2}), 1'000'000'000'000 + 10'000'000LL * i);
   }
   Damage damage;
   EXPECT_GE(sequences(file_, damage).back(), 450);

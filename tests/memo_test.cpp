@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "ves/base/memo.hpp"
+#include "ves/core/memo.hpp"
 
 #include <gtest/gtest.h>
 

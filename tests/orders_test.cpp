@@ -11,9 +11,9 @@
 #include "support/refusal.hpp"
 #include "support/rig.hpp"
 #include "support/robots.hpp"
+#include "ves/bus/channels.hpp"
 #include "ves/run/replay.hpp"
 #include "ves/run/run.hpp"
-#include "ves/transport/channels.hpp"
 
 namespace ves {
 namespace {
@@ -155,7 +155,7 @@ TEST(Orders, ARefusedCalibrationOfBeforeDoesNotEndALaterProgram) {
   rig.arm();
   rig.order(Request::kRun, segment(SegmentKind::kCalibration));
   rig.until(Phase::kArmed);
-  ASSERT_EQ(rig.state().calibration, Calibration::Status::kRefused);
+  ASSERT_EQ(rig.state().calibration, CalibrationStatus::kRefused);
   rig.tick(Request::kStart);
   int last = -1;
   rig.until([&](const TickState& s) {

@@ -11,8 +11,8 @@
 #include "support/rig.hpp"
 #include "support/robots.hpp"
 #include "ves/config/experiment.hpp"
+#include "ves/contract/leg_communication.hpp"
 #include "ves/control/gravity_compensation.hpp"
-#include "ves/control/leg_communication.hpp"
 
 namespace ves::plant {
 namespace {

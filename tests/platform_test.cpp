@@ -9,7 +9,7 @@
 #include "ves/analysis/platform.hpp"
 #include "ves/config/experiment.hpp"
 #include "ves/config/platform.hpp"
-#include "ves/simulation/lockstep.hpp"
+#include "ves/plant/lockstep.hpp"
 
 namespace ves {
 namespace {
@@ -216,7 +216,7 @@ TEST(AnyPlatform, DerivedIsWhatTheSameNumberWrittenOutWouldBe) {
   const Platform p = shipped("desk");
   const Stroke stroke = derivedStroke(p.use);
   EXPECT_EQ(p.actuator.length_min, stroke.min);
-  const double range = p.transducer.scale * plant::Temposonics::kMaxCount;
+  const double range = p.transducer.scale * kMaxLegCount;
   EXPECT_NEAR(p.transducer.offset + 0.5 * range, 0.5 * (stroke.min + stroke.max), 1e-12);
   // A number in the file stands, and what depends on it follows.
   const Platform other = loadPlatform(findPlatform("desk", kConfig), {"legs.stroke_min_m=0.110"});

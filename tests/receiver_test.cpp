@@ -2,7 +2,7 @@
 //
 // The oracle is liblcm, which sends; datagrams that it would never send are written byte by byte
 // (LCM, "UDP Multicast Protocol Description").
-#include "ves/transport/receiver.hpp"
+#include "ves/bus/receiver.hpp"
 
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
@@ -12,8 +12,8 @@
 #include <lcm/lcm-cpp.hpp>
 #include <random>
 
+#include "ves/bus/bus.hpp"
 #include "ves/realtime/realtime.hpp"
-#include "ves/transport/bus.hpp"
 
 namespace ves {
 namespace {

@@ -6,9 +6,9 @@
 
 #include "support/refusal.hpp"
 #include "support/rig.hpp"
+#include "ves/bus/channels.hpp"
 #include "ves/run/replay.hpp"
 #include "ves/run/run.hpp"
-#include "ves/transport/channels.hpp"
 
 namespace ves {
 namespace {

@@ -202,7 +202,7 @@ TEST(Safety, CalibrationRefusesAnUnknownLoad) {
   rig.arm();
   rig.order(Request::kRun, segment(SegmentKind::kCalibration));
   rig.until(Phase::kArmed);
-  EXPECT_EQ(rig.state().calibration, Calibration::Status::kRefused);
+  EXPECT_EQ(rig.state().calibration, CalibrationStatus::kRefused);
   EXPECT_EQ(rig.state().violation, StillnessViolation::kBias);
   EXPECT_EQ(rig.state().violation_index, 2);
 }

@@ -228,7 +228,7 @@ TEST(SensorBias, ACalibrationThatSucceedsSetsBiasDeviationAndError) {
   bias.beginCalibration();
   for (int n = 0; n < kCalibrationSamples; ++n)
     bias.calibrate(reading(100 + (n % 2 ? 3 : -3), n), true, Vec6::Constant(10.0));
-  EXPECT_EQ(bias.calibration().status(), Calibration::Status::kDone);
+  EXPECT_EQ(bias.calibration().status(), CalibrationStatus::kDone);
   EXPECT_LT((bias.counts() - Vec6::Constant(90.0)).norm(), 1e-9);
   EXPECT_NEAR(bias.deviation()(0), 3.0 * std::sqrt(100.0 / 99.0), 1e-9);
   EXPECT_LT(bias.standardError()(0), 1e-9);  // every batch has the same mean

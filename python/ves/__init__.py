@@ -14,7 +14,7 @@ angles. A wrench is {fx, fy, fz, mx, my, mz}. Equation numbers are those of NASA
 What is wrong with an argument is told in one line: TypeError for something that holds no numbers,
 ValueError for a shape or a value, and ves.InputError, a ValueError, for files and names.
 
-The messages of the bus are here too, by their names in lcmtypes/: ves.state_t, ves.sample_t and so on.
+The messages of the bus are here too, by their names: ves.state_t, ves.sample_t and so on.
 """
 from __future__ import annotations  # readable in help()
 

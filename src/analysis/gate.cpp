@@ -10,7 +10,7 @@
 #include <set>
 
 #include "ves/analysis/contact.hpp"
-#include "ves/base/coordinates.hpp"
+#include "ves/core/coordinates.hpp"
 
 namespace ves {
 namespace {

@@ -101,7 +101,7 @@ Stroke derivedStroke(const WorkspaceUse& use) {
 }
 
 double derivedOffset(const Stroke& stroke, double metre_per_count) {
-  const double range = metre_per_count * plant::Temposonics::kMaxCount;
+  const double range = metre_per_count * kMaxLegCount;
   return std::max(0.0, 0.5 * (stroke.min + stroke.max - range));
 }
 

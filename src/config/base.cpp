@@ -9,7 +9,7 @@
 #include <set>
 
 #include "readers.hpp"
-#include "ves/base/memo.hpp"
+#include "ves/core/memo.hpp"
 #include "ves/math/dense.hpp"
 
 namespace ves {

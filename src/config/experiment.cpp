@@ -8,11 +8,11 @@
 
 #include "readers.hpp"
 #include "ves/analysis/gate.hpp"
-#include "ves/base/coordinates.hpp"
 #include "ves/config/base.hpp"
 #include "ves/config/masses.hpp"
 #include "ves/config/servo.hpp"
 #include "ves/control/gravity_compensation.hpp"
+#include "ves/core/coordinates.hpp"
 #include "ves/math/dense.hpp"
 #include "ves/plant/nominal_servo.hpp"
 

@@ -24,13 +24,12 @@ Legs readLegs(Section s, const WorkspaceUse& use) {
   legs.transducer.offset = s.numberOr(
       "offset_m", 0.0, 20.0,
       derivedOffset({legs.actuator.length_min, legs.actuator.length_max}, legs.transducer.scale));
-  const double range = legs.transducer.scale * plant::Temposonics::kMaxCount,
+  const double range = legs.transducer.scale * kMaxLegCount,
                length = legs.actuator.length_max - legs.actuator.length_min;
   if (length > range)
-    s.fail("counts_per_in",
-           fmt::format("the stroke of {:.4f} m takes more than 14 bits, want at "
-                       "most {:.4g}",
-                       length, kMetrePerInch * plant::Temposonics::kMaxCount / length));
+    s.fail("counts_per_in", fmt::format("the stroke of {:.4f} m takes more than 14 bits, want at "
+                                        "most {:.4g}",
+                                        length, kMetrePerInch * kMaxLegCount / length));
   if (legs.actuator.length_min < legs.transducer.offset ||
       legs.actuator.length_max > legs.transducer.offset + range)
     s.fail("offset_m",

@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 
 #include "ves/analysis/platform.hpp"
-#include "ves/base/coordinates.hpp"
+#include "ves/core/coordinates.hpp"
 #include "ves/math/dense.hpp"
 
 namespace ves {

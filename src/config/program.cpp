@@ -6,7 +6,7 @@
 
 #include "readers.hpp"
 #include "robot_events.hpp"
-#include "ves/base/coordinates.hpp"
+#include "ves/core/coordinates.hpp"
 
 namespace ves {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/console/command.hpp"
-#include "ves/base/coordinates.hpp"
+#include "ves/core/coordinates.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

@@ -11,14 +11,14 @@
 
 #include "collector.hpp"
 #include "texts.hpp"
-#include "ves/base/coordinates.hpp"
+#include "ves/bus/channels.hpp"
 #include "ves/console/command.hpp"
 #include "ves/console/form.hpp"
+#include "ves/core/coordinates.hpp"
 #include "ves/realtime/realtime.hpp"
 #include "ves/results/evidence.hpp"
 #include "ves/results/series.hpp"
 #include "ves/run/session.hpp"
-#include "ves/transport/channels.hpp"
 
 namespace ves {
 namespace {
@@ -108,13 +108,14 @@ class Console {
           say(fmt::format("STOPPED in tick {} by: {}. The legs hold; `reset` when it is gone.",
                           s.cause_tick, failing(s.latched)));
           break;
+        case Phase::kCount: break;
       }
     }
-    const auto status = static_cast<Calibration::Status>(s.calibration);
+    const auto status = static_cast<CalibrationStatus>(s.calibration);
     if (status != calibration_status_) {
       calibration_status_ = status;
-      if (status == Calibration::Status::kDone) keepCalibration(s);
-      if (status == Calibration::Status::kRefused) {
+      if (status == CalibrationStatus::kDone) keepCalibration(s);
+      if (status == CalibrationStatus::kRefused) {
         failed_ = failed_ || !script_.empty();
         say(fmt::format("calibration refused: {}; the bias is as before", stirred(s, experiment_)));
       }
@@ -333,7 +334,7 @@ class Console {
   Phase phase_ = Phase::kParked;
   SegmentKind kind_ = SegmentKind::kCount;
   std::int32_t segment_ = -1;
-  Calibration::Status calibration_status_ = Calibration::Status::kNone;
+  CalibrationStatus calibration_status_ = CalibrationStatus::kNone;
   std::optional<CalibrationRecord> calibration_;
   double temperature_ = NAN;  // [C]
   std::optional<timing_t> timing_;

@@ -4,9 +4,9 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "ves/base/coordinates.hpp"
-#include "ves/base/errors.hpp"
 #include "ves/console/command.hpp"
+#include "ves/core/coordinates.hpp"
+#include "ves/core/errors.hpp"
 
 namespace ves {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-#include "ves/base/coordinates.hpp"
+#include "ves/core/coordinates.hpp"
 
 namespace ves {
 

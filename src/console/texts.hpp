@@ -6,8 +6,8 @@
 #include <optional>
 #include <string>
 
+#include "ves/bus/messages.hpp"
 #include "ves/config/experiment.hpp"
-#include "ves/transport/messages.hpp"
 
 namespace ves {
 

@@ -55,11 +55,11 @@ Vec6 ChannelStatistics::standardError() const noexcept {
 void Calibration::begin() noexcept {
   const StillnessLimits limits = limits_;
   *this = Calibration(limits);
-  status_ = Status::kTaking;
+  status_ = CalibrationStatus::kTaking;
 }
 
 void Calibration::add(const Sample& sample, const Vec6& load) noexcept {
-  if (status_ != Status::kTaking) return;
+  if (status_ != CalibrationStatus::kTaking) return;
   ++samples_;
   if (!has_first_) {
     first_ = sample;
@@ -72,7 +72,7 @@ void Calibration::add(const Sample& sample, const Vec6& load) noexcept {
     Eigen::Index largest = 0;
     const double bias = statistics_.mean().cwiseAbs().maxCoeff(&largest);
     if (most <= limits_.deviation && bias <= limits_.bias) {
-      status_ = Status::kDone;
+      status_ = CalibrationStatus::kDone;
       return;
     }
     if (most <= limits_.deviation)
@@ -80,7 +80,7 @@ void Calibration::add(const Sample& sample, const Vec6& load) noexcept {
     else
       restart(StillnessViolation::kChannel, static_cast<int>(worst), most);
   }
-  if (samples_ >= kPatience) status_ = Status::kRefused;
+  if (samples_ >= kPatience) status_ = CalibrationStatus::kRefused;
 }
 
 bool Calibration::moved(const Sample& sample) noexcept {

@@ -41,7 +41,7 @@ void Tare::step(const Sample& sample, bool fresh, const Vec6& static_counts, Vec
 
 void SensorBias::calibrate(const Sample& sample, bool fresh, const Vec6& static_counts) noexcept {
   if (fresh) calibration_.add(sample, static_counts);
-  if (calibration_.status() != Calibration::Status::kDone) return;
+  if (calibration_.status() != CalibrationStatus::kDone) return;
   calibrated_ = true;
   bias_ = calibration_.statistics().mean();
   deviation_ = calibration_.statistics().deviation();

@@ -193,14 +193,14 @@ void Supervisor::advance(const Situation& now, Actuation act) noexcept {
 
 bool Supervisor::segmentIsOver(const Situation& now, Actuation act) const noexcept {
   if (act.motion.kind() == SegmentKind::kCalibration)
-    return act.bias.calibration().status() != Calibration::Status::kTaking;
+    return act.bias.calibration().status() != CalibrationStatus::kTaking;
   return act.motion.over(now.tick);
 }
 
 void Supervisor::endSegment(const Situation& now, Actuation act) noexcept {
   const bool in_program = segment_ >= 0;
   if (in_program && act.motion.kind() == SegmentKind::kCalibration &&
-      act.bias.calibration().status() == Calibration::Status::kRefused) {
+      act.bias.calibration().status() == CalibrationStatus::kRefused) {
     abort(Refusal::kNone, now, act);  // it does not go on without what it asked for
   } else if (act.motion.moving() && !nextBrakes(now.config.program)) {
     act.motion.brake(now.config.gentle.braking);

@@ -5,19 +5,6 @@
 
 namespace ves {
 
-std::string_view name(Phase phase) noexcept {
-  switch (phase) {
-    case Phase::kDisarmed: return "disarmed";
-    case Phase::kArmed: return "armed";
-    case Phase::kRunning: return "running";
-    case Phase::kReturning: return "returning";
-    case Phase::kParked: return "parked";
-    case Phase::kStopped: return "stopped";
-    case Phase::kStopping: return "stopping";
-  }
-  return "unknown";
-}
-
 TestPlatform::TestPlatform(const ControllerConfig& config)
     : config_(config),
       period_(config.periodSeconds()),
@@ -83,7 +70,7 @@ const TickState& TestPlatform::tick(const TickInput& in) noexcept {
   }
   legCommunication(next);  // (C.13)
   legs_.sent(commander_.command().counts, in.tick, in.time);
-  return report(W);
+  return report(in, W);
 }
 
 /// The admittance model (C.2) to (C.7), trajectory generation (C.8) to (C.10), or rest.
@@ -131,7 +118,7 @@ void TestPlatform::legCommunication(const Checked& next) noexcept {
     commander_.send(next, supervisor_.segment(), share_.value(), legs_.servo(), legs_.age(time_));
 }
 
-const TickState& TestPlatform::report(const Wrenches& W) noexcept {
+const TickState& TestPlatform::report(const TickInput& in, const Wrenches& W) noexcept {
   const Phase phase = supervisor_.phase();
   commander_.allowPark(phase != Phase::kStopped && phase != Phase::kStopping);
   const Elapsed& elapsed = clock_.elapsed();
@@ -142,6 +129,10 @@ const TickState& TestPlatform::report(const Wrenches& W) noexcept {
   supervisor_.report(state_);
   state_.tick = elapsed.tick;
   state_.count = elapsed.count;
+  state_.time = in.time;
+  state_.request = in.order.request;
+  state_.request_id = in.order.id;
+  state_.conflicting_node = in.conflicting_node;
   state_.late_ticks = elapsed.late;
   state_.sample_sequence = samples_.sample().sequence;
   state_.age = samples_.age();

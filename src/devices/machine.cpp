@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/devices/machine.hpp"
 
+#include "ves/bus/channels.hpp"
 #include "ves/devices/net_ft.hpp"
 #include "ves/devices/on_bus.hpp"
-#include "ves/transport/channels.hpp"
 
 namespace ves::devices {
 

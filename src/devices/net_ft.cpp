@@ -13,7 +13,7 @@
 #include <cstring>
 #include <memory>
 
-#include "ves/base/errors.hpp"
+#include "ves/core/errors.hpp"
 #include "ves/realtime/realtime.hpp"
 
 namespace ves::devices {

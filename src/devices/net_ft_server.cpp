@@ -12,7 +12,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "ves/base/errors.hpp"
+#include "ves/core/errors.hpp"
 
 namespace ves::devices {
 namespace {

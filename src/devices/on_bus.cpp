@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/devices/on_bus.hpp"
 
+#include "ves/bus/channels.hpp"
 #include "ves/realtime/realtime.hpp"
-#include "ves/transport/channels.hpp"
 
 namespace ves::devices {
 

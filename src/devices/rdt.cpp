@@ -7,8 +7,8 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "ves/base/big_endian.hpp"
-#include "ves/base/errors.hpp"
+#include "ves/core/big_endian.hpp"
+#include "ves/core/errors.hpp"
 
 namespace ves::devices {
 namespace {

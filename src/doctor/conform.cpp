@@ -16,8 +16,7 @@ std::string strange(const sample_t& m) {
   for (int i = 0; i < 7; ++i)
     if (m.adc[i] < -32768 || m.adc[i] > 32767) return fmt::format("adc[{}] {}", i, m.adc[i]);
   for (int i = 0; i < 6; ++i)
-    if (m.legs[i] < 0 || m.legs[i] > plant::Temposonics::kMaxCount)
-      return fmt::format("legs[{}] {}", i, m.legs[i]);
+    if (m.legs[i] < 0 || m.legs[i] > kMaxLegCount) return fmt::format("legs[{}] {}", i, m.legs[i]);
   for (int i = 0; i < kMaxJoints; ++i)
     if (!std::isfinite(m.q[i]) || std::abs(m.q[i]) > 1e3) return fmt::format("q[{}] {}", i, m.q[i]);
   if (m.header.sequence < 0) return fmt::format("sequence {}", m.header.sequence);

@@ -19,10 +19,10 @@
 #include <sstream>
 #include <thread>
 
+#include "ves/bus/bus.hpp"
+#include "ves/bus/channels.hpp"
 #include "ves/config/document.hpp"
 #include "ves/realtime/realtime.hpp"
-#include "ves/transport/bus.hpp"
-#include "ves/transport/channels.hpp"
 
 namespace ves {
 namespace {
@@ -291,9 +291,11 @@ Latency response(const Experiment& experiment, const std::string& url, int times
       plant.command(command);
       plant.advance(i * experiment.controller.period);
     }
-    const sample_t sample = toMessage(plant.sample(), self, i - 1);
+    Sample sample = plant.sample();
+    sample.answers = i - 1;
+    const sample_t message = toMessage(sample, self);
     const std::int64_t now = monotonicNow();
-    bus.publish(channel::kSample, sample);
+    bus.publish(channel::kSample, message);
     return now;
   };
   return thereAndBack(bus, 0, times, send, [&] { return heard; });

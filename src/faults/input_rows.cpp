@@ -4,9 +4,9 @@
 #include <fstream>
 
 #include "rows.hpp"
+#include "ves/bus/channels.hpp"
+#include "ves/bus/event_log.hpp"
 #include "ves/run/run.hpp"
-#include "ves/transport/channels.hpp"
-#include "ves/transport/event_log.hpp"
 
 namespace ves {
 namespace {

@@ -4,8 +4,8 @@
 
 #include "rows.hpp"
 #include "ves/faults/soak.hpp"
+#include "ves/plant/lockstep.hpp"
 #include "ves/run/run.hpp"
-#include "ves/simulation/lockstep.hpp"
 
 namespace ves {
 namespace {
@@ -77,7 +77,7 @@ bool stopped(const TickState& s) { return s.cause != Check::kCount; }
 
 FaultOutcome sensorReversed(Experiment e) {
   e.controller.sensor.C_proc.row(2) *= -1.0;
-  Calibration::Status calibration = Calibration::Status::kNone;
+  CalibrationStatus calibration = CalibrationStatus::kNone;
   double seen = 0.0;  // [N]
   const RunResult r = runLockstep(e, nullptr, [&](const TickState& s) {
     calibration = s.calibration;
@@ -85,9 +85,9 @@ FaultOutcome sensorReversed(Experiment e) {
     return Order();
   });
   return outcome(
-      calibration == Calibration::Status::kRefused && r.aborted && r.phase == Phase::kParked,
+      calibration == CalibrationStatus::kRefused && r.aborted && r.phase == Phase::kParked,
       fmt::format("calibration {}, {}; {:.0f} N left of the weight",
-                  calibration == Calibration::Status::kRefused ? "refused" : "TAKEN", name(r.phase),
+                  calibration == CalibrationStatus::kRefused ? "refused" : "TAKEN", name(r.phase),
                   seen));
 }
 

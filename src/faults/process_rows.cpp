@@ -8,9 +8,9 @@
 #include <random>
 
 #include "rows.hpp"
+#include "ves/bus/channels.hpp"
 #include "ves/run/bus_observer.hpp"
 #include "ves/run/process.hpp"
-#include "ves/transport/channels.hpp"
 
 namespace ves {
 namespace {

@@ -6,8 +6,8 @@
 #include "rows.hpp"
 #include "ves/devices/net_ft.hpp"
 #include "ves/devices/net_ft_server.hpp"
+#include "ves/plant/lockstep.hpp"
 #include "ves/realtime/realtime.hpp"
-#include "ves/simulation/lockstep.hpp"
 
 namespace ves {
 namespace {

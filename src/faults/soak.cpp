@@ -6,7 +6,7 @@
 #include <random>
 
 #include "ves/config/experiment.hpp"
-#include "ves/simulation/lockstep.hpp"
+#include "ves/plant/lockstep.hpp"
 
 namespace ves {
 namespace {
@@ -63,7 +63,8 @@ Order drawOrder(Phase phase, Dice& dice) {
     case Phase::kStopped: return {dice.chance(0.02) ? Request::kReset : Request::kNone, {}, {}};
     case Phase::kReturning:
     case Phase::kParked:
-    case Phase::kStopping: break;
+    case Phase::kStopping:
+    case Phase::kCount: break;
   }
   return {};
 }

@@ -14,7 +14,7 @@
 #include <kdl/velocityprofile_trap.hpp>
 #include <random>
 
-#include "ves/base/errors.hpp"
+#include "ves/core/errors.hpp"
 #include "ves/math/dense.hpp"
 
 namespace ves {

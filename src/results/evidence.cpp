@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 
 #include "ves/analysis/platform.hpp"
-#include "ves/base/coordinates.hpp"
+#include "ves/core/coordinates.hpp"
 
 namespace ves {
 namespace {
@@ -113,7 +113,8 @@ std::string stirred(const state_t& s, const Experiment& experiment) {
           "{} would have a bias of {:.0f} counts ({:.0f} allowed): it carries a load that is not "
           "in the model, or less than that",
           channel, s.violation_amount, limits.bias);
-    case StillnessViolation::kNone: break;
+    case StillnessViolation::kNone:
+    case StillnessViolation::kCount: break;
   }
   return "no stream of new samples";
 }

@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "thinning.hpp"
-#include "ves/base/errors.hpp"
+#include "ves/core/errors.hpp"
 #include "ves/results/gnuplot.hpp"
 
 namespace ves {

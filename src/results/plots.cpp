@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "thinning.hpp"
-#include "ves/base/coordinates.hpp"
+#include "ves/core/coordinates.hpp"
 #include "ves/results/drift_samples.hpp"
 #include "ves/results/gnuplot.hpp"
 #include "ves/results/marks.hpp"

@@ -8,13 +8,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <iterator>
+#include <set>
 #include <utility>
 
-#include "ves/base/coordinates.hpp"
-#include "ves/transport/channels.hpp"
-#include "ves/transport/fields.hpp"
+#include "ves/bus/channels.hpp"
+#include "ves/bus/fields.hpp"
+#include "ves/core/coordinates.hpp"
 
 namespace ves {
 std::optional<Row> RowMaker::add(const LogEvent& event, const std::string& log) {
@@ -141,24 +141,86 @@ RecordedRun recordLockstep(const Experiment& experiment) {
 
 namespace {
 
-/// Every single number of a state that has no column of its own yet.
-void addScalars(std::vector<Column>& out) {
+/// "m/s^2" as names of columns end: "m_per_s2".
+std::string ending(std::string_view unit) {
+  std::string out;
+  for (std::size_t i = 0; i < unit.size(); ++i) {
+    if (unit[i] == '/')
+      out += out.empty() || out == "1" ? "per_" : "_per_";
+    else if (unit[i] != '^' && unit[i] != ' ')
+      out += unit[i];
+  }
+  if (out.starts_with("1per_")) out.erase(0, 1);
+  std::transform(out.begin(), out.end(), out.begin(),
+                 [](unsigned char c) { return std::tolower(c); });
+  return out;
+}
+
+/// What a value of a list is called, and its unit: "x", "m" of "m, rad".
+std::pair<std::string, std::string> part(schema::Along along, std::string_view unit, int i) {
+  const std::size_t comma = unit.find(", ");
+  const std::string_view own = comma == std::string_view::npos ? unit
+                               : i < 3                         ? unit.substr(0, comma)
+                                                               : unit.substr(comma + 2);
+  using enum schema::Along;
+  switch (along) {
+    case kCoordinates: return {std::string(coordinate(i).name), ending(own)};
+    case kWrench:
+    case kChannels: return {std::string(wrenchComponent(i).name), ending(own)};
+    default: return {fmt::format("leg{}", i + 1), ending(own)};
+  }
+}
+
+/// The names of a set, with + between; - when it is empty.
+std::string namesOf(Tripped set) {
+  std::string out;
+  set.forEach([&](Check check) { out += (out.empty() ? "" : "+") + std::string(name(check)); });
+  return out.empty() ? "-" : out;
+}
+
+/// Every field of a state: a column a number, enumerations and sets by their names.
+void addState(const Experiment& e, std::vector<Column>& out) {
+  const std::set<std::string_view> hidden = [&] {
+    std::set<std::string_view> h;
+    if (!e.controller.compensation.aided) h.insert("reaction");
+    if (!e.controller.compensation.adaptation)
+      h.insert({"gain_extend", "gain_retract", "servo_delay"});
+    return h;
+  }();
+  const TickState described{};
   const state_t prototype{};
-  forEachField(prototype, [&](const std::string& name, const auto& field) {
-    using T = std::remove_cvref_t<decltype(field)>;
-    const bool known = std::any_of(out.begin(), out.end(), [&](const Column& c) {
-      return c.name == name || c.name == name + "_bits";
-    });
-    if constexpr (!std::is_array_v<T>) {
-      const auto offset =
-          reinterpret_cast<const char*>(&field) - reinterpret_cast<const char*>(&prototype);
-      if (!known)
-        out.push_back({name, [offset](const Row& r) {
-                         T value;
-                         std::memcpy(&value, reinterpret_cast<const char*>(&r.state) + offset,
-                                     sizeof value);
-                         return static_cast<double>(value);
-                       }});
+  forEachPair(described, prototype, [&](const auto& field, const auto& in_message) {
+    using V = std::remove_cvref_t<decltype(field.value)>;
+    using M = std::remove_cvref_t<decltype(in_message)>;
+    const std::ptrdiff_t offset =
+        reinterpret_cast<const char*>(&in_message) - reinterpret_cast<const char*>(&prototype);
+    const auto read = [offset](const Row& r) -> const M& {
+      return *reinterpret_cast<const M*>(reinterpret_cast<const char*>(&r.state) + offset);
+    };
+    if constexpr (std::is_array_v<M>) {
+      if (hidden.contains(field.name)) return;
+      for (int i = 0; i < static_cast<int>(std::extent_v<M>); ++i) {
+        const auto [name, unit] = part(field.along, field.unit, i);
+        out.push_back({fmt::format("{}_{}_{}", name, field.column, unit),
+                       [=](const Row& r) { return static_cast<double>(read(r)[i]); },
+                       field.meaning,
+                       {}});
+      }
+    } else {
+      std::string name = field.name;
+      // Of some units the name says enough: "ahead_ns"; of some numbers there is none, or several.
+      const std::string unit = ending(field.unit);
+      const bool has_none = unit == "-" || unit.find('|') != std::string::npos;
+      if (!has_none && !name.ends_with("_" + unit)) name += "_" + unit;
+      Column column{
+          name, [=](const Row& r) { return static_cast<double>(read(r)); }, field.meaning, {}};
+      if constexpr (std::is_enum_v<V>)
+        column.text = [=](const Row& r) { return std::string(ves::name(static_cast<V>(read(r)))); };
+      if constexpr (std::same_as<V, Tripped>)
+        column.text = [=](const Row& r) {
+          return namesOf(Tripped(static_cast<std::uint32_t>(read(r))));
+        };
+      out.push_back(column);
     }
   });
 }
@@ -167,104 +229,84 @@ void addScalars(std::vector<Column>& out) {
 
 std::vector<Column> columns(const Experiment& experiment) {
   std::vector<Column> out;
-  const auto add = [&](std::string name, auto value) { out.push_back({std::move(name), value}); };
-  const auto addPose = [&](const char* what, const char* per, const double(state_t::*field)[6]) {
-    for (int i = 0; i < 6; ++i)
-      add(fmt::format("{}_{}_{}{}", coordinate(i).name, what, coordinate(i).unit, per),
-          [=](const Row& r) { return (r.state.*field)[i]; });
+  const auto add = [&](std::string name, auto value, std::string meaning) {
+    out.push_back({std::move(name), value, std::move(meaning), {}});
   };
-  const auto addWrench = [&](const char* what, const double(state_t::*field)[6]) {
-    for (int i = 0; i < 6; ++i)
-      add(fmt::format("{}_{}_{}", wrenchComponent(i).name, what, wrenchComponent(i).unit),
-          [=](const Row& r) { return (r.state.*field)[i]; });
+  const auto sample = [&](const std::string& name, auto value, const char* meaning) {
+    add(
+        name, [value](const Row& r) { return r.has_sample ? value(r.sample) : NAN; }, meaning);
   };
-  const auto addChannels = [&](const char* what, const double(state_t::*field)[6]) {
-    for (int i = 0; i < 6; ++i)
-      add(fmt::format("{}_{}_count", wrenchComponent(i).name, what),
-          [=](const Row& r) { return (r.state.*field)[i]; });
+  const auto truth = [&](const std::string& name, auto value, const char* meaning) {
+    add(
+        name, [value](const Row& r) { return r.has_truth ? value(r.truth) : NAN; }, meaning);
   };
-  const auto addLegs = [&](const char* what, const char* unit, const double(state_t::*field)[6]) {
-    for (int i = 0; i < 6; ++i)
-      add(fmt::format("leg{}_{}_{}", i + 1, what, unit),
-          [=](const Row& r) { return (r.state.*field)[i]; });
+  const auto timing = [&](const char* name, auto value, const char* meaning) {
+    add(
+        name,
+        [value](const Row& r) {
+          return r.has_timing ? static_cast<double>(value(r.timing)) * kSecondPerNanosecond : NAN;
+        },
+        meaning);
   };
 
-  add("t_s", [](const Row& r) { return r.t; });
-  add("tick", [](const Row& r) { return static_cast<double>(r.state.header.sequence); });
-  add("phase", [](const Row& r) { return static_cast<double>(r.state.phase); });
-  add("segment", [](const Row& r) { return static_cast<double>(r.state.segment); });
-  addPose("commanded", "", &state_t::x);
-  addPose("commanded_rate", "_per_s", &state_t::x_dot);
-  addPose("commanded_acceleration", "_per_s2", &state_t::x_ddot);
-  addPose("desired", "", &state_t::x_desired);
-  addPose("measured", "", &state_t::x_measured);
+  add(
+      "t_s", [](const Row& r) { return r.t; }, "since the first tick");
+  add(
+      "tick", [](const Row& r) { return static_cast<double>(r.state.header.sequence); },
+      "of the controller");
+  addState(experiment, out);
   for (int i = 0; i < 6; ++i)
-    add(fmt::format("{}_actual_{}", coordinate(i).name, coordinate(i).unit),
-        [=](const Row& r) { return r.hasTruePose() ? r.truth.x[i] : NAN; });
-  addWrench("total", &state_t::total);
-  addWrench("static", &state_t::static_wrench);
-  addWrench("inertial", &state_t::inertial);
-  if (experiment.controller.compensation.aided) addWrench("reaction", &state_t::reaction);
-  addWrench("dynamic", &state_t::dynamic);
-  addLegs("commanded", "m", &state_t::leg);
-  addLegs("commanded_rate", "m_per_s", &state_t::leg_dot);
-  addLegs("commanded_acceleration", "m_per_s2", &state_t::leg_ddot);
-  addLegs("reference", "m", &state_t::reference);
-  if (experiment.controller.compensation.adaptation) {
-    addLegs("gain_extend", "per_s", &state_t::gain_extend);
-    addLegs("gain_retract", "per_s", &state_t::gain_retract);
-    addLegs("servo_delay", "s", &state_t::servo_delay);
-  }
-  addLegs("measured", "m", &state_t::leg_measured);
+    add(
+        fmt::format("{}_actual_{}", coordinate(i).name, coordinate(i).unit),
+        [=](const Row& r) { return r.hasTruePose() ? r.truth.x[i] : NAN; },
+        "where the platform truly is");
   for (int i = 0; i < static_cast<int>(experiment.robot.joint_names.size()); ++i)
-    add(fmt::format("{}_{}", experiment.robot.joint_names[static_cast<std::size_t>(i)],
+    sample(
+        fmt::format("{}_{}", experiment.robot.joint_names[static_cast<std::size_t>(i)],
                     experiment.controller.payload.robot.jointLink(i).type == JointType::kRevolute
                         ? "rad"
                         : "m"),
-        [=](const Row& r) { return r.has_sample ? r.sample.q[i] : NAN; });
+        [=](const sample_t& s) { return s.q[i]; }, "joint of the robot");
   if (experiment.robot.tool()) {
     const auto whole = std::make_shared<const Experiment>(experiment);
     for (int i = 0; i < 6; ++i)
-      add(fmt::format("tool_{}_actual_{}", coordinate(i).name, coordinate(i).unit),
+      add(
+          fmt::format("tool_{}_actual_{}", coordinate(i).name, coordinate(i).unit),
           [=](const Row& r) {
             if (!r.hasTruePose()) return static_cast<double>(NAN);
             const JointVector q = JointVector::Map(r.truth.q);
             return coordinateOf(toolPose(*whole, Vec6::Map(r.truth.x), q), i);
-          });
+          },
+          "where the tool truly is, in inertial axes");
   }
   if (experiment.plant.world) {
-    const auto truth = [&](const std::string& name, auto value) {
-      add(name, [value](const Row& r) { return r.has_truth ? value(r.truth) : NAN; });
-    };
-    truth("clearance_m", [](const truth_t& m) { return m.clearance; });
+    truth(
+        "clearance_m", [](const truth_t& m) { return m.clearance; },
+        "of the tool from the nearest surface, least of the last step");
     for (int i = 0; i < 6; ++i)
-      truth(fmt::format("{}_contact_{}", wrenchComponent(i).name, wrenchComponent(i).unit),
-            [i](const truth_t& m) { return m.contact[i]; });
-    truth("contacts", [](const truth_t& m) { return static_cast<double>(m.contacts); });
+      truth(
+          fmt::format("{}_contact_{}", wrenchComponent(i).name, wrenchComponent(i).unit),
+          [i](const truth_t& m) { return m.contact[i]; },
+          "on the tool from what it touches, mean over the last step");
+    truth(
+        "contacts", [](const truth_t& m) { return static_cast<double>(m.contacts); }, "so far");
     if (experiment.plant.world->environment.target)
       for (int i = 0; i < 3; ++i) {
-        truth(fmt::format("{}_target_m", coordinate(i).name),
-              [i](const truth_t& m) { return m.target_p[i]; });
-        truth(fmt::format("{}_target_rate_m_per_s", coordinate(i).name),
-              [i](const truth_t& m) { return m.target_v[i]; });
+        truth(
+            fmt::format("{}_target_m", coordinate(i).name),
+            [i](const truth_t& m) { return m.target_p[i]; }, "of the body that floats");
+        truth(
+            fmt::format("{}_target_rate_m_per_s", coordinate(i).name),
+            [i](const truth_t& m) { return m.target_v[i]; }, "of the body that floats");
       }
   }
-  addChannels("bias", &state_t::bias);
-  addChannels("deviation", &state_t::deviation);
-  addChannels("standard_error", &state_t::standard_error);
-  for (int i = 0; i < 6; ++i)
-    add(fmt::format("leg{}_command_count", i + 1),
-        [=](const Row& r) { return static_cast<double>(r.state.counts[i]); });
-  add("temperature_c", [](const Row& r) { return r.has_sample ? r.sample.temperature : NAN; });
-  add("tripped_bits", [](const Row& r) { return static_cast<double>(r.state.tripped); });
-  add("latched_bits", [](const Row& r) { return static_cast<double>(r.state.latched); });
-  addScalars(out);
-  add("late_s", [](const Row& r) {
-    return r.has_timing ? static_cast<double>(r.timing.late_ns) * kSecondPerNanosecond : NAN;
-  });
-  add("compute_s", [](const Row& r) {
-    return r.has_timing ? static_cast<double>(r.timing.compute_ns) * kSecondPerNanosecond : NAN;
-  });
+  sample(
+      "temperature_c", [](const sample_t& s) { return s.temperature; },
+      "of the laboratory, by a thermometer beside the sensor");
+  timing(
+      "late_s", [](const timing_t& m) { return m.late_ns; }, "by which the tick came late");
+  timing(
+      "compute_s", [](const timing_t& m) { return m.compute_ns; }, "that the tick took");
   return out;
 }
 
@@ -276,6 +318,18 @@ bool selected(const std::string& name, const std::vector<std::string>& select,
   return take;
 }
 
+namespace {
+
+/// As a field of a table (RFC 4180).
+std::string csvField(std::string text) {
+  if (text.find_first_of(",\"") == std::string::npos) return text;
+  for (std::size_t at = 0; (at = text.find('"', at)) != std::string::npos; at += 2)
+    text.insert(at, 1, '"');
+  return '"' + text + '"';
+}
+
+}  // namespace
+
 std::string csvHeader(const std::vector<Column>& columns) {
   std::string line;
   for (const Column& column : columns) line += (line.empty() ? "" : ",") + column.name;
@@ -286,7 +340,10 @@ std::string csvRow(const std::vector<Column>& columns, const Row& row) {
   std::string line;
   for (const Column& column : columns) {
     if (!line.empty()) line += ',';
-    fmt::format_to(std::back_inserter(line), FMT_COMPILE("{}"), column.value(row));
+    if (column.text)
+      line += csvField(column.text(row));
+    else
+      fmt::format_to(std::back_inserter(line), FMT_COMPILE("{}"), column.value(row));
   }
   return line;
 }

@@ -8,7 +8,7 @@
 #include <fstream>
 #include <utility>
 
-#include "ves/base/coordinates.hpp"
+#include "ves/core/coordinates.hpp"
 #include "ves/realtime/latency.hpp"
 #include "ves/results/contacts.hpp"
 #include "ves/results/drift_samples.hpp"

@@ -8,7 +8,7 @@
 #include <map>
 #include <memory>
 
-#include "ves/base/coordinates.hpp"
+#include "ves/core/coordinates.hpp"
 
 namespace ves {
 
@@ -49,7 +49,9 @@ std::vector<Column> columnsOf(const ToolMotion& motion) {
                    [at, i](const Row& row) {
                      const auto found = at->find(row.state.header.sequence);
                      return found == at->end() ? NAN : coordinateOf(found->second, i);
-                   }});
+                   },
+                   "of the tool on the simulated base",
+                   {}});
   return out;
 }
 

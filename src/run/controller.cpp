@@ -2,13 +2,13 @@
 #include <fmt/format.h>
 
 #include "process_conduct.hpp"
+#include "ves/bus/channels.hpp"
 #include "ves/realtime/latency.hpp"
 #include "ves/realtime/realtime.hpp"
 #include "ves/run/announcer.hpp"
 #include "ves/run/flight_record.hpp"
 #include "ves/run/run.hpp"
 #include "ves/run/run_monitor.hpp"
-#include "ves/transport/channels.hpp"
 
 namespace ves {
 namespace {
@@ -72,7 +72,7 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
                   });
   }
   Announcer announcer(bus, options.url, describe(experiment, self, 0),
-                      setupOf(experiment, options.lockstep, header(self, 0, 0)));
+                      setupOf(experiment, options.lockstep));
 
   TickInput in;
   if (options.start) in.order.request = Request::kStart;
@@ -114,7 +114,7 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
       in.time = first + in.tick * experiment.controller.period;
       const TickState& state = platform.tick(in);
       const header_t h = header(self, in.tick, in.sample.time);
-      const state_t told = toMessage(state, in, h);
+      const state_t told = toMessage(state, h);
       out = toMessage(state.command, h);
       const leg_command_t logged = out;
       const bool over = finish(state);
@@ -124,7 +124,7 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
         link.send(out);
       }
       bus.publish(channel::kState, told);
-      flight.keep(told, toMessage(in.sample, {}, in.tick - 1));
+      flight.keep(told, toMessage(in.sample, {}));
       if (log) {
         log->write(channel::kState, told, in.sample.time);
         log->write(channel::kLegCommand, logged, in.sample.time);
@@ -177,9 +177,9 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
     const header_t h = header(self, in.tick, woke);
     link.send(toMessage(state.command, h));
     const std::int64_t sent = monotonicNow();
-    const state_t told = toMessage(state, in, h);
+    const state_t told = toMessage(state, h);
     bus.publish(channel::kState, told);
-    flight.keep(told, toMessage(in.sample, {}, -1));
+    flight.keep(told, toMessage(in.sample, {}));
     const std::int64_t over = monotonicNow();
     timing.header = h;
     timing.late_ns = ticker.late();

@@ -3,8 +3,8 @@
 
 #include <fmt/format.h>
 
-#include "ves/transport/channels.hpp"
-#include "ves/transport/event_log.hpp"
+#include "ves/bus/channels.hpp"
+#include "ves/bus/event_log.hpp"
 
 namespace ves {
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/run/follow_bus.hpp"
 
+#include "ves/bus/bus.hpp"
+#include "ves/bus/channels.hpp"
 #include "ves/realtime/realtime.hpp"
-#include "ves/transport/bus.hpp"
-#include "ves/transport/channels.hpp"
 
 namespace ves {
 

@@ -2,10 +2,11 @@
 #include <fmt/format.h>
 
 #include "process_conduct.hpp"
+#include "ves/bus/channels.hpp"
 #include "ves/devices/machine.hpp"
 #include "ves/run/robot_orders.hpp"
 #include "ves/run/run.hpp"
-#include "ves/transport/channels.hpp"
+#include "ves/run/truth.hpp"
 
 namespace ves {
 namespace {
@@ -64,17 +65,18 @@ void MachineProcess::moveRobot(bool wait) {
 }
 
 sample_t MachineProcess::publish(std::int64_t answers) {
-  const Sample& sample = *machine_.sample();
+  Sample sample = *machine_.sample();
   if (machine_.knowsTruth())
     bus_.publish(channel::kTruth,
                  toMessage(plant().truth(), header(self_, sample.sequence, sample.time)));
-  sample_t message = toMessage(sample, self_, answers);
+  sample.answers = answers;
   if (!options_.lockstep) {  // there a command comes at its tick, by the simulated clock
     const PlantLink::Heard& heard = link_.lastHeard();
-    message.command_source = heard.source;
-    message.command_sequence = heard.sequence;
-    message.command_time_ns = heard.time;
+    sample.command_source = heard.source;
+    sample.command_tick = heard.sequence;
+    sample.command_time = heard.time;
   }
+  const sample_t message = toMessage(sample, self_);
   bus_.publish(channel::kSample, message);
   return message;
 }

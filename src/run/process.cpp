@@ -11,7 +11,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "ves/base/errors.hpp"
+#include "ves/core/errors.hpp"
 
 namespace ves {
 

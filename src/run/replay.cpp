@@ -7,11 +7,11 @@
 #include <algorithm>
 #include <memory>
 
-#include "ves/base/build.hpp"
+#include "ves/bus/bus.hpp"
+#include "ves/bus/channels.hpp"
+#include "ves/bus/fields.hpp"
+#include "ves/core/build.hpp"
 #include "ves/realtime/realtime.hpp"
-#include "ves/transport/bus.hpp"
-#include "ves/transport/channels.hpp"
-#include "ves/transport/fields.hpp"
 
 namespace ves {
 namespace {
@@ -165,7 +165,7 @@ class Replayer {
     engaged_ = recorded.engaged != 0;
     const TickState& state = platform_->tick(in);
     ++result_.ticks;
-    note(recorded, toMessage(state, in, recorded.header));
+    note(recorded, toMessage(state, recorded.header));
     replayed_commands_.put(in.tick, toMessage(state.command, recorded.header));
     if (const auto* command = recorded_commands_.find(in.tick))
       noteCommand(*command, *replayed_commands_.find(in.tick));

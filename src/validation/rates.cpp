@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "ves/math/dense.hpp"
-#include "ves/simulation/one_leg.hpp"
+#include "ves/plant/one_leg.hpp"
 
 namespace ves {
 namespace {

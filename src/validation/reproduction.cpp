@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "ves/base/build.hpp"
+#include "ves/core/build.hpp"
 
 namespace ves {
 

@@ -12,7 +12,7 @@
 #include <optional>
 #include <set>
 
-#include "ves/base/coordinates.hpp"
+#include "ves/core/coordinates.hpp"
 #include "ves/results/comparison.hpp"
 #include "ves/results/summary.hpp"
 #include "ves/validation/chapter4.hpp"

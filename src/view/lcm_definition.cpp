@@ -8,7 +8,7 @@
 #include <sstream>
 
 #include "cdr.hpp"
-#include "ves/view/sources.hpp"
+#include "ves/view/definitions.hpp"
 
 namespace ves {
 namespace {
@@ -54,6 +54,10 @@ class LcmDefinition::Bytes {
 
 LcmDefinition::LcmDefinition(const std::string& lcm)
     : fields_(parse(lcm)), header_(parse(kLcmDefinitions.at("header_t"))) {}
+
+LcmDefinition LcmDefinition::of(const std::string& type) {
+  return LcmDefinition(kLcmDefinitions.at(type));
+}
 
 std::vector<LcmDefinition::Field> LcmDefinition::parse(const std::string& lcm) {
   std::vector<Field> out;

@@ -5,8 +5,8 @@
 
 #include <cstring>
 
+#include "ves/bus/channels.hpp"
 #include "ves/realtime/realtime.hpp"
-#include "ves/transport/channels.hpp"
 
 namespace ves {
 namespace {

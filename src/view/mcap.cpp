@@ -9,7 +9,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "ves/base/errors.hpp"
+#include "ves/core/errors.hpp"
 
 namespace ves {
 namespace {

@@ -8,9 +8,9 @@
 #include <map>
 
 #include "cdr.hpp"
-#include "ves/base/big_endian.hpp"
-#include "ves/transport/channels.hpp"
-#include "ves/transport/fields.hpp"
+#include "ves/bus/channels.hpp"
+#include "ves/bus/fields.hpp"
+#include "ves/core/big_endian.hpp"
 #include "ves/view/lcm_definition.hpp"
 #include "ves/view/mcap.hpp"
 #include "ves/view/sources.hpp"

@@ -8,9 +8,9 @@
 #include <map>
 
 #include "stl.hpp"
-#include "ves/base/coordinates.hpp"
-#include "ves/base/errors.hpp"
 #include "ves/control/safety_checks.hpp"
+#include "ves/core/coordinates.hpp"
+#include "ves/core/errors.hpp"
 #include "ves/math/dense.hpp"
 #include "ves/view/page.hpp"
 

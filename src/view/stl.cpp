@@ -8,7 +8,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "ves/base/errors.hpp"
+#include "ves/core/errors.hpp"
 
 namespace ves {
 namespace {

@@ -18,7 +18,7 @@
 #include <utility>
 #include <vector>
 
-#include "ves/base/errors.hpp"
+#include "ves/core/errors.hpp"
 
 namespace ves {
 namespace {

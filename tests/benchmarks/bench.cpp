@@ -15,12 +15,12 @@
 #include "support/poses.hpp"
 #include "support/rig.hpp"
 #include "support/robots.hpp"
+#include "ves/bus/channels.hpp"
+#include "ves/bus/key.hpp"
 #include "ves/control/gravity_compensation.hpp"
 #include "ves/realtime/realtime.hpp"
 #include "ves/run/replay.hpp"
 #include "ves/run/run.hpp"
-#include "ves/transport/channels.hpp"
-#include "ves/transport/key.hpp"
 
 namespace ves {
 namespace {

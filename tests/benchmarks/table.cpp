@@ -12,8 +12,8 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "ves/base/errors.hpp"
-#include "ves/transport/bus.hpp"
+#include "ves/bus/bus.hpp"
+#include "ves/core/errors.hpp"
 
 namespace {
 

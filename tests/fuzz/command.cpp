@@ -4,8 +4,8 @@
 #include <string>
 
 #include "bytes.hpp"
+#include "ves/bus/messages.hpp"
 #include "ves/console/command.hpp"
-#include "ves/transport/messages.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const ves::Experiment experiment =

@@ -7,8 +7,8 @@
 #include <string>
 
 #include "bytes.hpp"
-#include "ves/base/errors.hpp"
-#include "ves/transport/event_log.hpp"
+#include "ves/bus/event_log.hpp"
+#include "ves/core/errors.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const std::string file = "/dev/shm/ves_fuzz_log_" + std::to_string(getpid());

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "bytes.hpp"
-#include "ves/transport/messages.hpp"
+#include "ves/bus/messages.hpp"
 
 namespace {
 

@@ -6,8 +6,8 @@
 #include <cstdio>
 
 #include "bytes.hpp"
+#include "ves/bus/messages.hpp"
 #include "ves/config/experiment.hpp"
-#include "ves/transport/messages.hpp"
 
 namespace {
 
@@ -126,7 +126,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     }
     // Half the time through the gate, as on the bus; else as it is, gate or not.
     if (what & 1) {
-      if (const auto let_in = fromMessage(toMessage(s, {1, 1}, 0))) s = *let_in;
+      if (const auto let_in = fromMessage(toMessage(s, {1, 1}))) s = *let_in;
     }
     tick();
   }

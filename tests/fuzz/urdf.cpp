@@ -7,8 +7,8 @@
 #include <string>
 
 #include "bytes.hpp"
-#include "ves/base/errors.hpp"
 #include "ves/config/urdf.hpp"
+#include "ves/core/errors.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   console_bridge::noOutputHandler();

@@ -19,6 +19,22 @@ run(${WORK}/build/admittance)
 run(${WORK}/build/newton_euler ${config}/robots/puma560.urdf)
 run(${WORK}/build/controller ${config}/scenarios/puma_on_table_4_1.yaml)
 
+# A driver of legs needs the bus, and with it nothing of files, plants or robots' descriptions.
+run(${CMAKE_COMMAND} -S ${SOURCE}/apps/examples/driver -B ${WORK}/driver -G Ninja
+  -DCMAKE_PREFIX_PATH=${WORK}/prefix -DCMAKE_CXX_FLAGS=-Wall\ -Wextra\ -Werror)
+run(${CMAKE_COMMAND} --build ${WORK}/driver)
+execute_process(COMMAND ninja -C ${WORK}/driver -t commands legs_driver OUTPUT_VARIABLE commands)
+execute_process(COMMAND ldd ${WORK}/driver/legs_driver OUTPUT_VARIABLE libraries)
+message("${libraries}")
+if(NOT libraries MATCHES "liblcm")
+  message(FATAL_ERROR "the driver links no LCM:\n${libraries}")
+endif()
+foreach(other yaml gsl kdl urdfdom)
+  if("${commands}${libraries}" MATCHES "${other}")
+    message(FATAL_ERROR "the driver brings ${other}:\n${commands}\n${libraries}")
+  endif()
+endforeach()
+
 # What is not there is said, and the control path asks for Eigen alone.
 file(WRITE ${WORK}/none/CMakeLists.txt "cmake_minimum_required(VERSION 3.25)\nproject(none CXX)\n"
   "find_package(ves 0.1 REQUIRED COMPONENTS warp)\n")
@@ -28,7 +44,7 @@ if(result EQUAL 0 OR NOT out MATCHES "warp")
   message(FATAL_ERROR "a component that does not exist: ${result}\n${out}")
 endif()
 file(WRITE ${WORK}/alone/CMakeLists.txt "cmake_minimum_required(VERSION 3.25)\nproject(alone CXX)\n"
-  "find_package(ves 0.1 REQUIRED COMPONENTS math kinematics robot control)\n"
+  "find_package(ves 0.1 REQUIRED COMPONENTS contract control)\n"
   "foreach(other GSL::gsl fmt::fmt yaml-cpp lcm::lcm ves::plant)\n"
   "  if(TARGET \${other})\n    message(FATAL_ERROR \"brings \${other}\")\n  endif()\nendforeach()\n")
 run(${CMAKE_COMMAND} -S ${WORK}/alone -B ${WORK}/alone/build -DCMAKE_PREFIX_PATH=${WORK}/prefix)

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "ves/transport/bus.hpp"
+#include "ves/bus/bus.hpp"
 
 namespace ves::test {
 

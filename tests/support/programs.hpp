@@ -14,10 +14,10 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 
+#include "ves/bus/bus.hpp"
+#include "ves/bus/channels.hpp"
+#include "ves/bus/event_log.hpp"
 #include "ves/run/process.hpp"
-#include "ves/transport/bus.hpp"
-#include "ves/transport/channels.hpp"
-#include "ves/transport/event_log.hpp"
 
 namespace ves::test {
 

@@ -4,7 +4,7 @@
 #include <functional>
 #include <string>
 
-#include "ves/base/errors.hpp"
+#include "ves/core/errors.hpp"
 
 namespace ves::test {
 

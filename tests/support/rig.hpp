@@ -9,7 +9,7 @@
 
 #include "support/robots.hpp"
 #include "ves/config/experiment.hpp"
-#include "ves/simulation/lockstep.hpp"
+#include "ves/plant/lockstep.hpp"
 
 namespace ves::test {
 

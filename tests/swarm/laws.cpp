@@ -230,6 +230,7 @@ void Laws::trips(const TickState& s) {
     case P::kParked: good = may({P::kStopping, P::kStopped}); break;
     case P::kStopping: good = may({P::kStopped}); break;
     case P::kStopped: good = may({P::kDisarmed}); break;
+    case P::kCount: break;
   }
   if (!good) broken("trip", fmt::format("from {} to {}", name(b.phase), name(s.phase)));
 }
@@ -312,7 +313,7 @@ void Laws::frozen(std::int64_t time, const plant::Truth& truth) {
 /// Nobody commands: the legs stay at the last checked lengths, or go home, slowly.
 void Laws::alone(std::int64_t time, const plant::Truth& truth) {
   const Vec6& L = truth.legs.L;
-  const plant::Watchdog& watchdog = experiment_.plant.watchdog;
+  const Watchdog& watchdog = experiment_.plant.watchdog;
   if (!alone_from_) {
     alone_from_ = L;
     if (time - engaged_time_ < watchdog.park_after && time - engaged_time_ < 2 * kSecond) {

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <random>
 
-#include "ves/base/coordinates.hpp"
+#include "ves/core/coordinates.hpp"
 
 namespace ves::swarm {
 namespace {

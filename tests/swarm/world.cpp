@@ -7,14 +7,14 @@
 #include <fstream>
 
 #include "support/ether.hpp"
+#include "ves/bus/bus.hpp"
+#include "ves/bus/channels.hpp"
+#include "ves/bus/event_log.hpp"
 #include "ves/console/command.hpp"
 #include "ves/run/replay.hpp"
 #include "ves/run/robot_orders.hpp"
 #include "ves/run/run.hpp"
 #include "ves/run/run_monitor.hpp"
-#include "ves/transport/bus.hpp"
-#include "ves/transport/channels.hpp"
-#include "ves/transport/event_log.hpp"
 
 namespace ves::swarm {
 namespace {
@@ -197,7 +197,7 @@ class World {
     const std::int64_t shift = now - m.plant.time();
     for (std::int64_t* time : {&s.time, &s.legs_time, &s.wrench_time, &s.joints_time})
       *time = std::max<std::int64_t>(0, *time + shift);
-    sample_t message = toMessage(s, m.id, -1);
+    sample_t message = toMessage(s, m.id);
     message.command_source = m.link.lastHeard().source;
     message.command_sequence = m.link.lastHeard().sequence;
     message.command_time_ns = m.link.lastHeard().time;
@@ -244,7 +244,7 @@ class World {
     const leg_command_t command = toMessage(state.command, h);
     c.link.send(command);
     if (c.log) {
-      c.log->write(channel::kState, toMessage(state, c.in, h), ether_.now);
+      c.log->write(channel::kState, toMessage(state, h), ether_.now);
       c.log->write(channel::kLegCommand, command, ether_.now);
       c.spoilt = c.spoilt || disk_full_;
     }

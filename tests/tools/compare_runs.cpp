@@ -14,11 +14,11 @@
 #include <memory>
 #include <set>
 
-#include "ves/base/errors.hpp"
+#include "ves/bus/channels.hpp"
+#include "ves/bus/event_log.hpp"
+#include "ves/bus/fields.hpp"
+#include "ves/core/errors.hpp"
 #include "ves/run/process.hpp"
-#include "ves/transport/channels.hpp"
-#include "ves/transport/event_log.hpp"
-#include "ves/transport/fields.hpp"
 
 namespace ves {
 namespace {

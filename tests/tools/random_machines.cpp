@@ -20,6 +20,7 @@
 
 #include "machines.hpp"
 #include "support/rig.hpp"
+#include "ves/run/truth.hpp"
 #include "ves/analysis/gate.hpp"
 #include "ves/results/comparison.hpp"
 
@@ -73,7 +74,7 @@ Ended run(const Experiment& e, std::int64_t jitter, std::size_t late, unsigned s
     in.order = {};
     Row row;
     row.t = static_cast<double>(in.time) * kSecondPerNanosecond;
-    row.state = toMessage(state, in, header({1, 0}, in.tick, in.time));
+    row.state = toMessage(state, header({1, 0}, in.tick, in.time));
     row.truth = on_the_way.front().second;
     row.has_truth = true;
     out.series.rows.push_back(row);

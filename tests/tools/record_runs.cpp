@@ -11,10 +11,10 @@
 #include <random>
 #include <set>
 
+#include "ves/bus/channels.hpp"
+#include "ves/bus/event_log.hpp"
 #include "ves/config/experiment.hpp"
 #include "ves/run/run.hpp"
-#include "ves/transport/channels.hpp"
-#include "ves/transport/event_log.hpp"
 
 namespace ves {
 namespace {
@@ -107,12 +107,11 @@ class Recorder {
       }
       Sample sample = plant.sample();
       injector.apply(fault, i <= fault_until, e.plant.sensor.volts_per_count, sample);
-      if (const auto let_in = fromMessage(toMessage(sample, {2, 0}, in.tick - 1)))
-        in.sample = *let_in;
+      if (const auto let_in = fromMessage(toMessage(sample, {2, 0}))) in.sample = *let_in;
       in.conflicting_node = chance(2e-4);
       const TickState& s = platform.tick(in);
       const header_t h = header({1, 0}, in.tick, plant.time());
-      log.write(channel::kState, toMessage(s, in, h), plant.time());
+      log.write(channel::kState, toMessage(s, h), plant.time());
       log.write(channel::kLegCommand, toMessage(s.command, h), plant.time());
       in.order = {};
       if (chance(0.02)) {

@@ -3,7 +3,7 @@
 // The controller against the simulated machine, tick by tick: controller SCENARIO.yaml
 #include <cstdio>
 #include <ves/config/experiment.hpp>
-#include <ves/simulation/lockstep.hpp>
+#include <ves/plant/lockstep.hpp>
 
 int main(int argc, char** argv) {
   if (argc != 2) return std::fprintf(stderr, "controller SCENARIO.yaml\n"), 2;

@@ -20,7 +20,7 @@
 #include <string_view>
 #include <vector>
 
-#include "ves/base/errors.hpp"
+#include "ves/core/errors.hpp"
 
 namespace ves {
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "ves/config/experiment.hpp"
-#include "ves/planning/robot_order.hpp"
+#include "ves/contract/robot_order.hpp"
 
 namespace ves {
 

@@ -3,8 +3,8 @@
 // Force measurement (Appendix C): A/D counts to the wrench on the platform.
 #pragma once
 
+#include "ves/contract/tick_state.hpp"
 #include "ves/control/program.hpp"
-#include "ves/control/sample.hpp"
 
 namespace ves {
 
@@ -55,14 +55,10 @@ class ChannelStatistics {
   Vec6 batch_m2_ = Vec6::Zero();
 };
 
-/// What kept a calibration from being taken.
-enum class StillnessViolation : std::int32_t { kNone, kLeg, kJoint, kChannel, kBias };
-
 /// The calibration routine (report, 2.3): the bias of each channel over 100 samples at rest. Starts
 /// again whenever something moves, and gives up after kPatience samples.
 class Calibration {
  public:
-  enum class Status : std::int32_t { kNone, kTaking, kDone, kRefused };
   static constexpr int kPatience = 5 * kCalibrationSamples;  // [-] samples
 
   explicit Calibration(const StillnessLimits& limits) : limits_(limits) {}
@@ -70,7 +66,7 @@ class Calibration {
   void begin() noexcept;
   void add(const Sample& sample, const Vec6& load) noexcept;
 
-  Status status() const noexcept { return status_; }
+  CalibrationStatus status() const noexcept { return status_; }
   const ChannelStatistics& statistics() const noexcept { return statistics_; }
   /// Of the last movement seen: what, which (from 0), and how much [count | rad | m].
   StillnessViolation violation() const noexcept { return violation_; }
@@ -82,7 +78,7 @@ class Calibration {
   bool moved(const Sample& sample) noexcept;
 
   StillnessLimits limits_;
-  Status status_ = Status::kNone;
+  CalibrationStatus status_ = CalibrationStatus::kNone;
   int samples_ = 0;  // [-] since begin()
   bool has_first_ = false;
   Sample first_;

@@ -6,16 +6,10 @@
 
 #include <array>
 
+#include "ves/contract/tick_state.hpp"
 #include "ves/control/servo.hpp"
 
 namespace ves {
-
-/// What the model is told of each leg, and what a machine's may differ in.
-struct ServoGains {
-  Vec6 extend = Vec6::Zero();   // [1/s] K for E > 0
-  Vec6 retract = Vec6::Zero();  // [1/s] and for E < 0
-  Vec6 delay = Vec6::Zero();    // [s]
-};
 
 /// All times are [ns] of the machine's clock.
 class ModelledServos {

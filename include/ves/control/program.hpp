@@ -11,29 +11,6 @@
 
 namespace ves {
 
-enum class SegmentKind : std::int32_t {
-  kCalibration,  // hold until still, and take the bias of the sensor
-  kMove,         // brakes if it must, then gently to rest at a pose
-  kTrajectory,
-  kAdmittance,  // from wherever the platform is, as the model's state at rest
-  kMonitor,     // hold, and sample the sensor every interval
-  kPath,        // the configuration's recorded path
-  kCount
-};
-
-std::string_view name(SegmentKind kind) noexcept;
-
-/// One item of testPlatform's menu.
-struct Segment {
-  SegmentKind kind = SegmentKind::kTrajectory;
-  double duration = 0.0;    // [s] of a move: 0 for as long as is gentle
-  Pose target;              // of a move, from home
-  Trajectory trajectory{};  // of a trajectory
-  double interval = 0.0;    // [s] of a monitor segment, from one sample to the next
-};
-
-inline constexpr int kMaxSegments = 64;
-
 struct Program {
   int size = 0;
   std::array<Segment, kMaxSegments> segments{};
@@ -53,54 +30,5 @@ bool wantsAdmittance(const Program& program) noexcept;
 
 /// A calibration takes so many samples, and so does each sample of a monitor segment.
 inline constexpr int kCalibrationSamples = 100;  // [-] per channel
-
-enum class Request : std::int32_t {
-  kNone,
-  kStart,         // take the legs, run the program, come home
-  kStop,          // brake, come home gently, let go
-  kArm,           // take the legs and hold; orders will follow
-  kRun,           // the order's segment
-  kHold,          // brake and hold here
-  kTare,          // what is measured now is subtracted from here on
-  kReset,         // out of a stop, back to disarmed
-  kCompensate,    // what the configuration has of compensation comes in
-  kUncompensate,  // and goes out again: as published
-  kOvertaken,     // an order that a hold or a stop came before: it is answered, and not obeyed
-  kCount
-};
-
-std::string_view name(Request request) noexcept;
-
-/// Why an order was not taken.
-enum class Refusal : std::int32_t {
-  kNone,
-  kNotArmed,        // the legs are not ours
-  kBusy,            // something else is running: hold first
-  kArmed,           // the legs are ours already
-  kNotStopped,      // nothing to leave
-  kCauseRemains,    // a check still fails
-  kOutside,         // its path would fail a safety check
-  kLoaded,          // the wrench is larger than admittance control should begin with
-  kUnstable,        // admittance control with this base and robot would diverge
-  kNoCompensation,  // the configuration has none
-  kUnassessed,      // the stability of this loop was not checked
-  kChecking,        // not refused yet: its path is being checked, over some ticks
-  kOvertaken,       // a hold, a stop or a failing check came before it began
-  kCount
-};
-
-std::string_view name(Refusal refusal) noexcept;
-
-/// Who gave an order, and its number: where the segment of a kRun is to be found again.
-struct OrderId {
-  std::int64_t source = 0;
-  std::int64_t sequence = -1;  // [-] -1: given without a message
-};
-
-struct Order {
-  Request request = Request::kNone;
-  Segment segment;  // of kRun
-  OrderId id;
-};
 
 }  // namespace ves

@@ -12,7 +12,7 @@
 // before that, and r reaches it `delay` after the tick that sent it.
 #pragma once
 
-#include "ves/control/leg_communication.hpp"
+#include "ves/contract/leg_communication.hpp"
 #include "ves/kinematics/stewart.hpp"
 
 namespace ves {

@@ -4,12 +4,12 @@
 // state diagram is in control/test_platform.hpp.
 #pragma once
 
+#include "ves/contract/tick_state.hpp"
 #include "ves/control/answers.hpp"
 #include "ves/control/leg_commander.hpp"
 #include "ves/control/motion_generator.hpp"
 #include "ves/control/sensor_bias.hpp"
 #include "ves/control/tick_clock.hpp"
-#include "ves/control/tick_state.hpp"
 
 namespace ves {
 

@@ -46,7 +46,7 @@ class TestPlatform {
   Waypoint<6> nextMotion(const Wrench& dynamic) noexcept;
   Checked safetyChecks(const Proposal& next, const Wrench& dynamic, bool conflict) const noexcept;
   void legCommunication(const Checked& next) noexcept;
-  const TickState& report(const Wrenches& W) noexcept;
+  const TickState& report(const TickInput& in, const Wrenches& W) noexcept;
 
   ControllerConfig config_;
   double period_;          // [s]

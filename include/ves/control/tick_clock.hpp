@@ -5,7 +5,7 @@
 
 #include <cstdint>
 
-#include "ves/control/sample.hpp"
+#include "ves/contract/sample.hpp"
 
 namespace ves {
 

@@ -3,25 +3,12 @@
 // Trajectory generation (Appendix C): a ramp or a sine in each of the six coordinates.
 #pragma once
 
-#include <array>
 #include <cstdint>
 
-#include "ves/math/frames.hpp"
+#include "ves/contract/order.hpp"
 #include "ves/math/quintic.hpp"
 
 namespace ves {
-
-enum class AxisMotion { kHold, kRamp, kSine };
-
-/// What one coordinate does.
-struct Axis {
-  AxisMotion motion = AxisMotion::kHold;
-  double final = 0.0;      // [m | rad] of a ramp, counted from home
-  double amplitude = 0.0;  // [m | rad] of a sine
-  double frequency = 0.0;  // [Hz] of a sine
-};
-
-using Trajectory = std::array<Axis, 6>;
 
 /// Coordinates n periods after the start at `initial`; a ramp reaches its end at n = steps, (C.8),
 /// (C.9), and stays; a sine is (C.10). Ramps are evaluated, not accumulated, so they end exactly.

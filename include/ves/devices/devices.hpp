@@ -5,7 +5,7 @@
 // Nothing here throws, waits or blocks: it is called every 2 ms.
 #pragma once
 
-#include "ves/control/sample.hpp"
+#include "ves/contract/sample.hpp"
 
 namespace ves::devices {
 

@@ -6,9 +6,10 @@
 #include <memory>
 #include <string_view>
 
+#include "ves/bus/bus.hpp"
+#include "ves/config/experiment.hpp"
 #include "ves/devices/simulation.hpp"
 #include "ves/devices/tracker.hpp"
-#include "ves/transport/bus.hpp"
 
 namespace ves::devices {
 

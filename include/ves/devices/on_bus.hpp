@@ -4,8 +4,8 @@
 // in, on a channel of its own.
 #pragma once
 
+#include "ves/bus/bus.hpp"
 #include "ves/devices/devices.hpp"
-#include "ves/transport/bus.hpp"
 
 namespace ves::devices {
 

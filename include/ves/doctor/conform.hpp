@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "ves/transport/messages.hpp"
+#include "ves/bus/messages.hpp"
 
 namespace ves {
 

@@ -7,19 +7,10 @@
 #include <memory>
 #include <vector>
 
+#include "ves/contract/robot_order.hpp"
 #include "ves/math/quintic.hpp"
-#include "ves/robot/robot_model.hpp"
 
 namespace ves {
-
-/// A fifth-order motion of one joint, from wherever it is.
-struct RobotMove {
-  int joint = 0;          // [-] from 0
-  double target = 0.0;    // [rad | m]
-  double duration = 1.0;  // [s]
-
-  bool operator==(const RobotMove&) const = default;
-};
 
 /// A motion of all joints that was planned: fifth-order pieces, one behind the other. Before its
 /// start and behind its end it rests.

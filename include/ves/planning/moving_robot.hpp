@@ -32,11 +32,6 @@ struct GraspTarget {
   bool operator==(const GraspTarget&) const = default;
 };
 
-/// Lets go of either.
-struct Release {
-  bool operator==(const Release&) const = default;
-};
-
 using RobotAction = std::variant<RobotMove, ToolMove, Grasp, GraspTarget, Release>;
 
 double durationOf(const RobotAction& action) noexcept;  // [s]

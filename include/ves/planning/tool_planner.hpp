@@ -7,7 +7,6 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "ves/planning/joint_paths.hpp"
@@ -21,20 +20,6 @@ struct ToolGoal {
   double duration = 0.0;       // [s]; 0: by `speed`
   double speed = 0.0;          // [m/s] between the ramps
 };
-
-/// A tool path as people say it.
-struct ToolOrder {
-  enum class Frame { kRobot, kPlatform, kInertial };
-
-  bool by = false;               // from where the tool is; otherwise to a pose
-  Frame in = Frame::kRobot;      // whose axes and, of a pose, origin
-  std::optional<Vec3> position;  // [m]; none: as it is
-  std::optional<Vec3> rpy;       // [rad] of the tool, or the turn of it; none: as it is
-  std::optional<Vec3> via;       // [m] like `position`
-  double duration = 0.0;         // [s]; 0: by `speed`
-  double speed = 0.0;            // [m/s]
-};
-inline constexpr std::string_view kToolFrameNames[] = {"robot", "platform", "inertial"};
 
 /// X_FL0 of a frame, the platform at X_IP.
 Transform baseIn(ToolOrder::Frame frame, const Transform& X_IP, const Transform& X_PL0);

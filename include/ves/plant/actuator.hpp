@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstdint>
 
+#include "ves/contract/sample.hpp"
+
 namespace ves::plant {
 
 struct ActuatorModel {
@@ -51,7 +53,6 @@ class Actuator {
 struct Temposonics {
   double offset = 0.0;  // [m] length at the middle of count 0
   double scale = 0.0;   // [m/count]
-  static constexpr std::int32_t kMaxCount = (1 << 14) - 1;
 
   std::int32_t count(double length) const noexcept;
 };

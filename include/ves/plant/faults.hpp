@@ -9,8 +9,8 @@
 #include <optional>
 #include <string_view>
 
+#include "ves/contract/sample.hpp"
 #include "ves/control/program.hpp"
-#include "ves/control/sample.hpp"
 
 namespace ves::plant {
 

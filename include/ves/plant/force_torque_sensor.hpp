@@ -3,7 +3,7 @@
 // Force-torque sensor, strain-gage conditioner and A/D converter (report, section 2.2, figure 2.9).
 #pragma once
 
-#include "ves/control/sample.hpp"
+#include "ves/contract/sample.hpp"
 #include "ves/math/butterworth.hpp"
 #include "ves/plant/noise.hpp"
 

@@ -18,14 +18,14 @@
 #include <vector>
 
 #include "ves/contact/contact_watch.hpp"
+#include "ves/contract/leg_watchdog.hpp"
+#include "ves/contract/sample.hpp"
 #include "ves/control/program.hpp"
-#include "ves/control/sample.hpp"
 #include "ves/planning/moving_robot.hpp"
 #include "ves/plant/actuator.hpp"
 #include "ves/plant/faults.hpp"
 #include "ves/plant/force_torque_sensor.hpp"
 #include "ves/plant/leg_slave.hpp"
-#include "ves/plant/leg_watchdog.hpp"
 #include "ves/robot/newton_euler.hpp"
 #include "ves/robot/payload.hpp"
 

@@ -9,7 +9,7 @@
 #include <optional>
 #include <vector>
 
-#include "ves/base/memo.hpp"
+#include "ves/core/memo.hpp"
 #include "ves/results/series.hpp"
 #include "ves/srms/interaction.hpp"
 

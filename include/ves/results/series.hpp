@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
+#include "ves/bus/event_log.hpp"
+#include "ves/bus/messages.hpp"
 #include "ves/run/run.hpp"
-#include "ves/transport/event_log.hpp"
-#include "ves/transport/messages.hpp"
 
 namespace ves {
 
@@ -70,6 +70,8 @@ RecordedRun recordLockstep(const Experiment& experiment);
 struct Column {
   std::string name;
   std::function<double(const Row&)> value;
+  std::string meaning;
+  std::function<std::string(const Row&)> text;  // what a person reads for it; empty: the number
 };
 std::vector<Column> columns(const Experiment& experiment);
 

@@ -9,9 +9,13 @@
 #include <string>
 #include <thread>
 
-#include "ves/transport/bus.hpp"
+#include "ves/bus/bus.hpp"
+#include "ves/config/experiment.hpp"
 
 namespace ves {
+
+/// What drivers are told of an experiment.
+MachineSetup setupOf(const Experiment& experiment, bool lockstep);
 
 /// Publishes VES_EXPERIMENT and VES_SETUP at once, once a second while disarmed, and when a
 /// VES_QUERY asks, at most five times a second. By a thread and a socket of its own: the control
@@ -20,7 +24,8 @@ class Announcer {
  public:
   /// Queries are those that `bus` hears, as long as this lives. Throws InputError when the bus
   /// cannot be opened.
-  Announcer(Bus& bus, const std::string& url, const experiment_t& experiment, const setup_t& setup);
+  Announcer(Bus& bus, const std::string& url, const experiment_t& experiment,
+            const MachineSetup& setup);
   ~Announcer();
   Announcer(const Announcer&) = delete;
   Announcer& operator=(const Announcer&) = delete;

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <functional>
 
-#include "ves/transport/bus.hpp"
+#include "ves/bus/bus.hpp"
 
 namespace ves {
 

@@ -6,7 +6,7 @@
 #include <functional>
 #include <string>
 
-#include "ves/transport/event_log.hpp"
+#include "ves/bus/event_log.hpp"
 
 namespace ves {
 

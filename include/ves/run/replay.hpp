@@ -7,8 +7,8 @@
 #include <optional>
 #include <string>
 
+#include "ves/bus/event_log.hpp"
 #include "ves/config/experiment.hpp"
-#include "ves/transport/event_log.hpp"
 
 namespace ves {
 

@@ -10,7 +10,9 @@
 #include <string>
 
 #include "ves/config/experiment.hpp"
-#include "ves/planning/robot_order.hpp"
+#include "ves/contract/robot_order.hpp"
+#include "ves/planning/tool_planner.hpp"
+#include "ves/plant/plant.hpp"
 
 namespace ves {
 

@@ -7,9 +7,9 @@
 #include <functional>
 #include <string>
 
+#include "ves/bus/bus.hpp"
+#include "ves/bus/event_log.hpp"
 #include "ves/config/experiment.hpp"
-#include "ves/transport/bus.hpp"
-#include "ves/transport/event_log.hpp"
 
 namespace ves {
 

@@ -13,6 +13,8 @@ class LcmDefinition {
  public:
   /// The text of an .lcm file with one struct. A header_t in it is that of lcmtypes/.
   explicit LcmDefinition(const std::string& lcm);
+  /// Of one of our messages, as "state_t".
+  static LcmDefinition of(const std::string& type);
 
   /// The ros2msg definition, comments behind their fields.
   std::string ros2() const;

@@ -10,7 +10,7 @@
 #include <optional>
 #include <string>
 
-#include "ves/transport/bus.hpp"
+#include "ves/bus/bus.hpp"
 #include "ves/view/scene.hpp"
 #include "ves/view/web_server.hpp"
 

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/plant/lockstep.hpp"
+
+#include <fmt/format.h>
+
+#include "ves/bus/channels.hpp"
+#include "ves/core/build.hpp"
+#include "ves/realtime/realtime.hpp"
+#include "ves/run/run.hpp"
+#include "ves/run/run_monitor.hpp"
+#include "ves/run/truth.hpp"
+
+namespace ves {
+
+experiment_t describe(const Experiment& experiment, const Identity& from, std::int64_t time) {
+  experiment_t m;
+  m.header = header(from, 0, time);
+  m.schema = kSchema;
+  m.name = experiment.name;
+  m.hash = experiment.hash;
+  m.version = describeBuild();
+  m.resolved = experiment.resolved;
+  return m;
+}
+
+void requireSimulated(const Experiment& experiment) {
+  if (experiment.machine.simulated()) return;
+  throw InputError(fmt::format(
+      "{}: a machine with real pieces runs in real time; lockstep wants `machine` all simulated",
+      experiment.name));
+}
+
+RunResult runRecorded(const Experiment& experiment, RunRecorder* recorder, const Watch& watch,
+                      Request first) {
+  requireSimulated(experiment);
+  const Identity controller{1, 0}, machine{2, 0};
+  Lockstep loop(experiment.controller, experiment.plant);
+  RunMonitor monitor(experiment.controller);
+  const auto time = [&] { return loop.plant().time(); };
+  if (recorder) recorder->begin(describe(experiment, controller, 0));
+
+  const std::int64_t start = monotonicNow();
+  std::int64_t orders = 0;
+  for (loop.input.order.request = first;; loop.advance()) {
+    const TickState& state = loop.tick();
+    if (recorder) {
+      const header_t h = header(controller, state.tick, time());
+      Sample sample = loop.sample();
+      sample.answers = state.tick - 1;
+      recorder->tick(
+          {toMessage(loop.plant().truth(), header(machine, loop.sample().sequence, time())),
+           toMessage(sample, machine), toMessage(state, h), toMessage(state.command, h)},
+          time());
+    }
+    Order& order = loop.input.order;
+    order = watch ? watch(state) : Order();
+    if (monitor.reached(state, order.request)) break;
+    if (order.request == Request::kRun) {
+      order.id = {controller.source, orders++};
+      if (recorder)
+        recorder->order(
+            toMessage(order, controller.source, header(controller, order.id.sequence, time())),
+            time());
+    }
+  }
+  return monitor.result(monotonicNow() - start);
+}
+
+namespace {
+
+class LogRecorder : public RunRecorder {
+ public:
+  explicit LogRecorder(LogWriter& log) : log_(log) {}
+  void begin(const experiment_t& experiment) override {
+    log_.write(channel::kExperiment, experiment, 0);
+  }
+  void tick(const TickMessages& m, std::int64_t time) override {
+    log_.write(channel::kTruth, m.truth, time);
+    log_.write(channel::kSample, m.sample, time);
+    log_.write(channel::kState, m.state, time);
+    log_.write(channel::kLegCommand, m.command, time);
+  }
+  void order(const operator_t& order, std::int64_t time) override {
+    log_.write(channel::kOperator, order, time);
+  }
+
+ private:
+  LogWriter& log_;
+};
+
+}  // namespace
+
+RunResult runLockstep(const Experiment& experiment, LogWriter* log, const Watch& watch,
+                      Request first) {
+  if (!log) return runRecorded(experiment, nullptr, watch, first);
+  LogRecorder recorder(*log);
+  RunResult result = runRecorded(experiment, &recorder, watch, first);
+  log->flush();
+  result.log_lost = log->lost();
+  result.log_trouble = log->trouble();
+  return result;
+}
+
+}  // namespace ves

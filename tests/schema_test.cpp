@@ -1,0 +1,324 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// The one description of what travels (contract/schema.hpp): a value of its own in every field comes
+// out of the bus, a log, the table, MCAP and Python as it went in.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <set>
+#include <sstream>
+
+#include "support/programs.hpp"
+#include "support/rig.hpp"
+#include "ves/bus/bus.hpp"
+#include "ves/bus/channels.hpp"
+#include "ves/bus/fields.hpp"
+#include "ves/results/series.hpp"
+#include "ves/view/lcm_definition.hpp"
+
+namespace ves {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Every number of a struct by the name of its field, as "x[2]".
+using Numbers = std::vector<std::pair<std::string, double>>;
+
+template <typename S>
+Numbers numbersOf(const S& s) {
+  Numbers out;
+  schema::forEach(s, [&](const auto& field) {
+    const auto add = [&](const auto& values) {
+      for (int i = 0; i < static_cast<int>(std::size(values)); ++i)
+        out.emplace_back(field.name + ("[" + std::to_string(i) + "]"),
+                         static_cast<double>(values[static_cast<std::size_t>(i)]));
+    };
+    using V = std::remove_cvref_t<decltype(field.value)>;
+    if constexpr (std::same_as<V, Wrench> || std::same_as<V, Pose>)
+      add(field.value.stacked().eval());
+    else if constexpr (std::same_as<V, Tripped>)
+      out.emplace_back(field.name, field.value.bits());
+    else if constexpr (std::same_as<V, Mat6>) {
+      for (int i = 0; i < 36; ++i)
+        out.emplace_back(field.name + ("[" + std::to_string(i) + "]"), field.value(i / 6, i % 6));
+    } else if constexpr (requires { std::size(field.value); })
+      add(field.value);
+    else
+      out.emplace_back(field.name, static_cast<double>(field.value));
+  });
+  return out;
+}
+
+/// Another value in every number; of enumerations and flags, not the one they begin with.
+template <typename S>
+S filled() {
+  S s;
+  int n = 0;
+  const auto set = [&](auto& to) {
+    using V = std::remove_cvref_t<decltype(to)>;
+    ++n;
+    if constexpr (std::same_as<V, bool>)
+      to = !to;
+    else if constexpr (std::is_enum_v<V>)
+      to = static_cast<V>((static_cast<int>(to) + 1) % static_cast<int>(V::kCount));
+    else if constexpr (std::is_floating_point_v<V>)
+      to = n + 0.5;
+    else
+      to = static_cast<V>(n);
+  };
+  schema::forEach(s, [&](const auto& field) {
+    auto& value = field.value;
+    using V = std::remove_cvref_t<decltype(value)>;
+    if constexpr (std::same_as<V, Wrench>) {
+      for (Vec3* half : {&value.f, &value.n})
+        for (double& x : *half) set(x);
+    } else if constexpr (std::same_as<V, Pose>) {
+      for (Vec3* half : {&value.p, &value.rpy})
+        for (double& x : *half) set(x);
+    } else if constexpr (std::same_as<V, Mat6>) {
+      for (int i = 0; i < 36; ++i) set(value(i / 6, i % 6));
+    } else if constexpr (std::same_as<V, Tripped>) {
+      value = Tripped(static_cast<std::uint32_t>(++n));
+    } else if constexpr (requires { std::begin(value); }) {
+      for (auto& x : value) set(x);
+    } else {
+      set(value);
+    }
+  });
+  return s;
+}
+
+Sample filledSample() {
+  auto s = filled<Sample>();
+  s.sequence = 3;
+  s.time = 1'000'000;
+  s.switches = kFloorMatClosed;
+  s.faults = kLegsPiece | kRobotPiece;
+  return s;
+}
+
+MachineSetup filledSetup() {
+  auto s = filled<MachineSetup>();
+  s.legs.scale *= 1e-3;
+  s.joints = 7;
+  return s;
+}
+
+template <typename Message>
+std::vector<std::uint8_t> bytesOf(const Message& m) {
+  std::vector<std::uint8_t> bytes(static_cast<std::size_t>(m.getEncodedSize()));
+  m.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  return bytes;
+}
+
+TEST(Schema, NoTwoNumbersOfAFilledStateAreAlike) {  // so that an exchange shows
+  std::set<double> seen;
+  const TickState nothing;
+  const Numbers before = numbersOf(nothing), numbers = numbersOf(filled<TickState>());
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    EXPECT_NE(numbers[i].second, before[i].second) << numbers[i].first;
+    if (numbers[i].second > 22.0) {
+      EXPECT_TRUE(seen.insert(numbers[i].second).second) << numbers[i].first;
+    }
+  }
+  EXPECT_GT(seen.size(), 140u);
+}
+
+TEST(Schema, EveryFieldComesOutOfItsMessage) {
+  const auto goes = [](const auto& s, const auto& message) {
+    const auto back = fromMessage(message);
+    ASSERT_TRUE(back);
+    EXPECT_EQ(numbersOf(*back), numbersOf(s));
+  };
+  goes(filledSample(), toMessage(filledSample(), {1, 2}));
+  goes(filled<LegCommand>(), toMessage(filled<LegCommand>(), header({1, 2}, 3, 4)));
+  goes(filledSetup(), toMessage(filledSetup(), header({1, 2}, 3, 4)));
+  goes(filled<TickState>(), toMessage(filled<TickState>(), header({1, 2}, 3, 4)));
+}
+
+TEST(Schema, AStateThatNamesNoSuchPhaseIsNone) {
+  const auto with = [](auto change) {
+    state_t m = toMessage(filled<TickState>(), header({1, 2}, 3, 4));
+    change(m);
+    return fromMessage(m).has_value();
+  };
+  EXPECT_TRUE(with([](state_t&) {}));
+  EXPECT_FALSE(with([](state_t& m) { m.phase = static_cast<int>(Phase::kCount) + 1; }));
+  EXPECT_FALSE(with([](state_t& m) { m.refusal = -1; }));
+  EXPECT_FALSE(with([](state_t& m) { m.tripped = 1 << static_cast<int>(Check::kCount); }));
+  EXPECT_FALSE(with([](state_t& m) { m.engaged = 2; }));
+}
+
+TEST(Schema, EveryFieldComesOutOfTheBus) {
+  enterPrivateBus();
+  Bus controller(kDefaultUrl), listener(kDefaultUrl);
+  std::optional<TickState> heard;
+  listener.subscribe({channel::kState},
+                     [&](const std::string&, const void* data, std::uint32_t size) {
+                       if (const auto m = decode<state_t>(data, size)) heard = fromMessage(*m);
+                     });
+  controller.publish(channel::kState, toMessage(filled<TickState>(), header({1, 2}, 3, 4)));
+  for (int i = 0; i < 50 && !heard; ++i) listener.wait(100);
+  ASSERT_TRUE(heard);
+  EXPECT_EQ(heard->tick, 3);
+  EXPECT_EQ(numbersOf(*heard), numbersOf(filled<TickState>()));
+}
+
+TEST(Schema, EveryFieldComesOutOfALog) {
+  const fs::path file = fs::temp_directory_path() / fmt::format("ves_schema_{}.lcmlog", getpid());
+  {
+    LogWriter log(file.string());
+    log.write(channel::kState, toMessage(filled<TickState>(), header({1, 2}, 3, 4)), 0);
+  }
+  LogReader log(file.string());
+  LogEvent event;
+  ASSERT_TRUE(log.next(event));
+  const auto state = fromMessage(event.require<state_t>(file.string()));
+  fs::remove(file);
+  ASSERT_TRUE(state);
+  EXPECT_EQ(numbersOf(*state), numbersOf(filled<TickState>()));
+}
+
+std::vector<std::string> cells(const std::string& line) {
+  std::vector<std::string> out(1);
+  bool quoted = false;
+  for (const char c : line) {
+    if (c == '"')
+      quoted = !quoted;
+    else if (c == ',' && !quoted)
+      out.emplace_back();
+    else
+      out.back() += c;
+  }
+  return out;
+}
+
+TEST(Schema, EveryFieldHasItsColumnsWithTheirUnits) {
+  Experiment e = test::experiment("z_sine");
+  e.controller.compensation.aided = e.controller.compensation.adaptation = true;
+  Row row;
+  row.state = toMessage(filled<TickState>(), header({1, 2}, 3, 4));
+  const std::vector<Column> all = columns(e);
+  const std::vector<std::string> names = cells(csvHeader(all)), values = cells(csvRow(all, row));
+  ASSERT_EQ(names.size(), values.size());
+  std::map<std::string, std::string> table;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    EXPECT_TRUE(table.emplace(names[i], values[i]).second) << names[i] << " stands there twice";
+    EXPECT_FALSE(all[i].meaning.empty()) << names[i];
+  }
+  // Every number is somewhere, and nowhere twice.
+  std::multiset<double> told;
+  for (const auto& [name, value] : table)
+    if (value.find_first_not_of("0123456789.") == std::string::npos) told.insert(std::stod(value));
+  for (const auto& [name, value] : numbersOf(filled<TickState>()))
+    if (value > 22.0 && name != "tripped" && name != "latched") {
+      EXPECT_EQ(told.count(value), 1u) << name;
+    }
+  // Some by hand: of each kind one, with its unit.
+  const TickState s = filled<TickState>();
+  const auto number = [&](const std::string& name) { return std::stod(table.at(name)); };
+  EXPECT_EQ(number("fz_total_n"), s.total.f.z());
+  EXPECT_EQ(number("mx_static_nm"), s.static_wrench.n.x());
+  EXPECT_EQ(number("gamma_commanded_rad"), s.motion.x(5));
+  EXPECT_EQ(number("x_commanded_rate_m_per_s"), s.motion.x_dot(0));
+  EXPECT_EQ(number("alpha_commanded_acceleration_rad_per_s2"), s.motion.x_ddot(3));
+  EXPECT_EQ(number("beta_measured_rad"), s.measured.rpy.y());
+  EXPECT_EQ(number("leg6_measured_m"), s.L_measured(5));
+  EXPECT_EQ(number("leg2_gain_extend_per_s"), s.servo.extend(1));
+  EXPECT_EQ(number("fy_bias_count"), s.bias(1));
+  EXPECT_EQ(number("leg3_rest_count"), s.command.rest[2]);
+  EXPECT_EQ(number("energy_paid_j"), s.energy_paid);
+  EXPECT_EQ(number("passivity_damping_per_s"), s.passivity_damping);
+  EXPECT_EQ(number("ahead_ns"), static_cast<double>(s.command.ahead));
+  EXPECT_EQ(table.at("phase"), "armed");
+  EXPECT_EQ(table.at("kind"), "move");
+  EXPECT_EQ(table.at("cause"), "floor mat");
+  EXPECT_EQ(table.at("refusal"), "the legs are not armed");
+  std::string set;
+  s.tripped.forEach([&](Check c) { set += (set.empty() ? "" : "+") + std::string(name(c)); });
+  EXPECT_EQ(table.at("tripped"), set);
+}
+
+/// Numbers of a message as ROS 2 has it, read by its definition's text.
+Numbers rosNumbers(const std::string& definition, const std::string& cdr) {
+  Numbers out;
+  std::size_t at = 4;  // after the encapsulation's header
+  std::istringstream lines(definition);
+  const std::map<std::string, std::size_t> sizes = {
+      {"int8", 1}, {"int32", 4}, {"int64", 8}, {"float64", 8}};
+  for (std::string line; std::getline(lines, line) && line[0] != '=';) {
+    std::istringstream words(line);
+    std::string type, name;
+    words >> type >> name;
+    if (type == "ves_msgs/Header") {
+      at += 48;
+      continue;
+    }
+    int count = 1;
+    const std::size_t open = type.find('[');
+    if (open != std::string::npos) {
+      count = std::stoi(type.substr(open + 1));
+      type.erase(open);
+    }
+    const std::size_t size = sizes.at(type);
+    for (int i = 0; i < count; ++i) {
+      at = 4 + (at - 4 + size - 1) / size * size;
+      double value = 0.0;
+      const auto read = [&](auto number) {
+        std::memcpy(&number, cdr.data() + at, sizeof number);
+        value = static_cast<double>(number);
+      };
+      if (type == "int8") read(std::int8_t{});
+      if (type == "int32") read(std::int32_t{});
+      if (type == "int64") read(std::int64_t{});
+      if (type == "float64") read(double{});
+      at += size;
+      out.emplace_back(open == std::string::npos ? name : fmt::format("{}[{}]", name, i), value);
+    }
+  }
+  EXPECT_EQ(at, cdr.size());
+  return out;
+}
+
+TEST(Schema, EveryFieldComesOutOfMcap) {
+  const auto goes = [](const auto& s, const auto& message) {
+    const LcmDefinition definition = LcmDefinition::of(message.getTypeName());
+    EXPECT_EQ(rosNumbers(definition.ros2(), definition.cdr(bytesOf(message))), numbersOf(s));
+  };
+  goes(filled<TickState>(), toMessage(filled<TickState>(), header({1, 2}, 3, 4)));
+  goes(filledSample(), toMessage(filledSample(), {1, 2}));
+  goes(filledSetup(), toMessage(filledSetup(), header({1, 2}, 3, 4)));
+}
+
+TEST(Schema, EveryFieldComesOutOfPython) {
+  const fs::path folder = fs::temp_directory_path() / fmt::format("ves_schema_{}", getpid());
+  fs::create_directories(folder);
+  const auto goes = [&](const auto& s, const auto& message) {
+    const std::vector<std::uint8_t> bytes = bytesOf(message);
+    std::ofstream(folder / "message", std::ios::binary)
+        .write(reinterpret_cast<const char*>(bytes.data()), std::ssize(bytes));
+    std::ofstream(folder / "read.py") << fmt::format(
+        "import sys\n"
+        "sys.path.insert(0, '{}/../python')\n"
+        "from ves import {} as kind\n"
+        "m = kind.decode(open('{}/message', 'rb').read())\n"
+        "for name in kind.__slots__[1:]:\n"
+        "    value = getattr(m, name)\n"
+        "    for i, x in enumerate(value if hasattr(value, '__len__') else [value]):\n"
+        "        print(name + (f'[{{i}}]' if hasattr(value, '__len__') else ''), repr(float(x)))\n",
+        VES_TEST_APP_DIR, message.getTypeName(), folder.string());
+    std::istringstream said(test::sh(fmt::format("python3 {}/read.py", folder.string())).text);
+    Numbers told;
+    for (std::string name, value; said >> name >> value;) told.emplace_back(name, std::stod(value));
+    EXPECT_EQ(told, numbersOf(s));
+  };
+  goes(filled<TickState>(), toMessage(filled<TickState>(), header({1, 2}, 3, 4)));
+  goes(filled<LegCommand>(), toMessage(filled<LegCommand>(), header({1, 2}, 3, 4)));
+  goes(filledSample(), toMessage(filledSample(), {1, 2}));
+  fs::remove_all(folder);
+}
+
+}  // namespace
+}  // namespace ves
