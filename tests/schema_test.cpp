@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// The one description of what travels (contract/schema.hpp): a value of its own in every field comes
-// out of the bus, a log, the table, MCAP and Python as it went in.
+// The one description of what travels (contract/schema.hpp): a value of its own in every field
+// comes out of the bus, a log, the table, MCAP and Python as it went in.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -179,6 +179,81 @@ TEST(Schema, EveryFieldComesOutOfALog) {
   fs::remove(file);
   ASSERT_TRUE(state);
   EXPECT_EQ(numbersOf(*state), numbersOf(filled<TickState>()));
+}
+
+/// Runs in which everything happens that a state can tell.
+std::set<std::string> everTold() {
+  const Numbers before = numbersOf(TickState());
+  std::set<std::string> told;
+  const auto look = [&](const TickState& s) {
+    const Numbers now = numbersOf(s);
+    for (std::size_t i = 0; i < now.size(); ++i)
+      if (now[i].second != before[i].second) told.insert(now[i].first);
+  };
+  std::int64_t orders = 0;
+  const auto run = [&](Lockstep& loop, int ticks) {
+    for (int i = 0; i < ticks; ++i) look(loop.step());
+  };
+  const auto order = [&](Lockstep& loop, Request request, int ticks, const Segment& segment = {}) {
+    look(loop.step({request, segment, {7, ++orders}}));
+    run(loop, ticks);
+  };
+  const auto loopOf = [](const std::string& scenario, const std::vector<std::string>& set) {
+    const Experiment e = test::experiment(scenario, set);
+    return Lockstep(e.controller, e.plant);
+  };
+  {  // a motion of the robot with everything that compensates, and a push into the envelope
+    std::vector<std::string> set = test::kCompensated;
+    set.insert(set.end(),
+               {"controller.compensation.wrench=aided", "controller.compensation.adaptation=true",
+                "controller.passivity.enabled=true", "controller.passivity.reserve_j=0",
+                "controller.passivity.damping_per_s=5"});
+    Lockstep loop = loopOf("puma_on_table_4_1", set);
+    order(loop, Request::kStart, 2500);
+    Lockstep pushed = loopOf("puma_on_table_4_1", {"base.stiffness_diagonal=[150, 250, 400, "
+                                                   "1500, 1000, 2000]"});
+    pushed.disturb = [](Sample& s) {
+      if (s.sequence > 600)
+        s.adc[2] = std::min(s.adc[2] + 8 * static_cast<int>(s.sequence - 600), 20'000);
+    };
+    order(pushed, Request::kStart, 1500);
+  }
+  {  // calibrations, a monitor segment, refusals and a trip, ticks missed, a node that conflicts
+    Lockstep loop = loopOf("puma_on_table_4_1", {});
+    run(loop, 20);
+    order(loop, Request::kArm, 20);
+    order(loop, Request::kRun, 100, test::sine(1, 0.02, 1.0, 0.5));
+    loop.disturb = [](Sample& s) { s.q(1) += 1e-2 * static_cast<double>(s.sequence % 2); };
+    order(loop, Request::kRun, 700, test::segment(SegmentKind::kCalibration));
+    loop.disturb = {};
+    Segment monitor = test::segment(SegmentKind::kMonitor, 60.0);
+    monitor.interval = 20.0;
+    order(loop, Request::kRun, 300, monitor);
+    order(loop, Request::kHold, 50);
+    Segment outside = test::segment(SegmentKind::kMove);
+    outside.target.p.z() = 9.0;
+    order(loop, Request::kRun, 50, outside);
+    loop.advance(3);
+    run(loop, 2);
+    loop.disturb = [](Sample& s) { s.sequence = 5; };
+    run(loop, 2);
+    loop.disturb = {};
+    loop.input.conflicting_node = true;
+    run(loop, 2);
+  }
+  {  // a program that cannot start its admittance control
+    Lockstep loop = loopOf("puma_on_table_4_1", {"safety.start_force_n=0.001"});
+    order(loop, Request::kStart, 2500);
+  }
+  return told;
+}
+
+TEST(Schema, NoFieldOfAStateStaysAsItBegan) {
+  const std::set<std::string> told = everTold();
+  std::string silent;
+  for (const auto& [name, value] : numbersOf(TickState()))
+    if (!told.contains(name)) silent += " " + name;
+  EXPECT_EQ(silent, "");
 }
 
 std::vector<std::string> cells(const std::string& line) {

@@ -167,7 +167,7 @@ constexpr auto fields(S& s) {
       Field{"segment", "-", s.segment, "of the program, -1 outside it"},
       Field{"kind", "-", s.kind, "of the segment that runs"},
       Field{"idle", "-", s.idle, "ticks to come of which nothing is expected"},
-      Field{"age", "-", s.age, "ticks since the sample was new"},
+      Field{"age", "-", s.age, "ticks since the last fresh sample"},
       Field{"total", "N, N m", s.total, "measured wrench about Po in {I}", kWrench, "total"},
       Field{"static_wrench", "N, N m", s.static_wrench, "of gravity, same point and axes", kWrench,
             "static"},
