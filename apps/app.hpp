@@ -153,9 +153,9 @@ inline void warnOfContacts(const Experiment& experiment) {
   const auto stiff = [](const ContactVerdict& one) {
     return !one.grows && std::abs(one.impact.energy_error) > kMostEnergyError;
   };
-  const auto all = assessContacts(experiment.controller, experiment.plant, false);
+  const auto all = assessContacts(experiment.controller, experiment.plant.task, false);
   if (!std::any_of(all.begin(), all.end(), stiff)) return;
-  for (const ContactVerdict& one : assessContacts(experiment.controller, experiment.plant))
+  for (const ContactVerdict& one : assessContacts(experiment.controller, experiment.plant.task))
     if (stiff(one)) fmt::print(stderr, "warning: {}\n", explain(one));
 }
 
@@ -247,13 +247,14 @@ inline void printDamage(const Damage& damage) {
 
 inline void printWarnings(const Experiment& experiment, bool verbose = false) {
   if (verbose)
-    for (const std::string& note : experiment.notes) fmt::print(stderr, "note: {}\n", note);
-  for (const std::string& warning : experiment.warnings)
+    for (const std::string& note : experiment.source.notes) fmt::print(stderr, "note: {}\n", note);
+  for (const std::string& warning : experiment.source.warnings)
     fmt::print(stderr, "warning: {}\n", warning);
-  if (experiment.calibration && age(*experiment.calibration) > kCalibrationKeeps)
-    fmt::print(
-        stderr, "warning: the calibration of {} is {:.1f} h old; its bias drifts, and keeps {} h\n",
-        dateText(experiment.calibration->date), age(*experiment.calibration), kCalibrationKeeps);
+  if (experiment.source.calibration && age(*experiment.source.calibration) > kCalibrationKeeps)
+    fmt::print(stderr,
+               "warning: the calibration of {} is {:.1f} h old; its bias drifts, and keeps {} h\n",
+               dateText(experiment.source.calibration->date), age(*experiment.source.calibration),
+               kCalibrationKeeps);
 }
 
 }  // namespace ves::app

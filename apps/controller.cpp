@@ -43,7 +43,7 @@ std::filesystem::path findCalibration(ControllerOptions& options) {
   if (!options.calibration.empty() || !std::filesystem::exists(kept, error)) return kept;
   const Value document = loadDocument(kept);
   const CalibrationRecord record = readCalibration(Section(document, ""));
-  if (record.setup == options.load().setup)
+  if (record.setup == options.load().source.calibrated)
     options.calibration = kept.string();
   else
     fmt::print(stderr, "warning: {} is of another sensor, robot or gravity: not used\n",

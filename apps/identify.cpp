@@ -51,8 +51,8 @@ int plan(const std::string& scenario, const PosePlanOptions& options, double spe
   const SeparableCombinations combinations =
       orRefuse(base.string(), [&] { return separableCombinations(e.controller.payload.robot); });
   const PosePlan plan = orRefuse(base.string(), [&] {
-    return planPoses(staticSetup(e.controller), combinations, e.controller, e.plant.initial_joints,
-                     options);
+    return planPoses(staticSetup(e.controller), combinations, e.controller,
+                     e.plant.task.initial_joints, options);
   });
   if (!std::isfinite(plan.condition))
     throw InputError(

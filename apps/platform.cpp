@@ -28,7 +28,9 @@ void printLegs(const Platform& p) {
 
 void printLimits(const Platform& p) {
   const Stroke stroke = derivedStroke(p.use);
-  const SafetyLimits derived = derivedLimits(p.use, p.gains, p.actuator, p.transducer);
+  const SafetyLimits derived =
+      derivedLimits(p.use, {p.actuator.length_min, p.actuator.length_max},
+                    plant::nominalServo(p.gains, p.actuator, p.transducer));
   fmt::print("\n  {:<34}{:>12}{:>12}\n", "", "in use", "derived");
   const auto row = [](const char* key, double used, double follows) {
     fmt::print("  {:<34}{:>12.4f}{:>12.4f}\n", key, used, follows);

@@ -51,7 +51,7 @@ inline LaunchOptions prepareFolder(RunnerOptions& options, const Experiment& exp
   LaunchOptions launch;
   launch.program = ownProgram();
   launch.scenario = folder / "experiment.yaml";
-  writeFile(launch.scenario, experiment.resolved);
+  writeFile(launch.scenario, experiment.source.resolved);
   options.process.log = (folder / "run.lcmlog").string();
   launch.process = options.process;
   return launch;

@@ -16,8 +16,8 @@ namespace {
 
 /// The loop with the softest 1, 2, .. modes kept, the verdict on all of them, and its margins.
 int showLoop(const Experiment& e) {
-  const JointVector& q = e.plant.initial_joints;
-  const Loop loop = loopOf(e.controller, e.plant, q, Direction::kExtending);
+  const JointVector& q = e.plant.task.initial_joints;
+  const Loop loop = loopOf(e.controller, q, Direction::kExtending);
   fmt::print("{:>5} {:>10} {:>16}   {:>28}   {:>28}   {:>28}\n", "modes", "[Hz]",
              "mass ratio (E.20)", "legs extending: growth [1/s]", "retracting: growth [1/s]",
              "swinging: growth [1/s]");
@@ -26,7 +26,7 @@ int showLoop(const Experiment& e) {
                massRatios(softest(loop.base, k), loop.robot_P)(0));
     for (const Direction direction :
          {Direction::kExtending, Direction::kRetracting, Direction::kSwinging}) {
-      Loop some = loopOf(e.controller, e.plant, q, direction);
+      Loop some = loopOf(e.controller, q, direction);
       some.base = softest(some.base, k);
       const DominantRoot s = dominantRoot(some);
       fmt::print("   {:>+10.3f} at {:>7.3f} Hz {:<6}", s.growth, s.frequency,
@@ -34,9 +34,9 @@ int showLoop(const Experiment& e) {
     }
     fmt::print("\n");
   }
-  const std::vector<ContactVerdict> contacts = assessContacts(e.controller, e.plant);
+  const std::vector<ContactVerdict> contacts = assessContacts(e.controller, e.plant.task);
   for (const ContactVerdict& contact : contacts) fmt::print("{}\n", explain(contact));
-  const LoopVerdict v = assessStability(e.controller, e.plant);
+  const LoopVerdict v = assessStability(e.controller, e.plant.task);
   if (!v.stable) {
     fmt::print("{}\n", explain(v));
     return kTripped;
@@ -54,7 +54,7 @@ int showLoop(const Experiment& e) {
         least(m.early >= Margins::kMostTime), 1e3 * m.early, least(m.late >= Margins::kMostTime),
         1e3 * m.late, least(m.delay == Margins::kMostDelay), m.delay);
   }
-  const bool grows = !contactsDecay(e.controller, e.plant);
+  const bool grows = !contactsDecay(e.controller, e.plant.task);
   if (grows) fmt::print("a contact would grow: admittance control is refused\n");
   return grows ? kTripped : kDone;
 }
@@ -161,8 +161,8 @@ bool usesContact(const MapAxis& axis) {
 std::optional<ExpectedContact> hardestContact(const Experiment& e) {
   std::optional<ExpectedContact> out;
   double most = -HUGE_VAL;
-  for (const ExpectedContact& contact : expectedContacts(e.controller, e.plant)) {
-    const Loop loop = loopOf(e.controller, e.plant, contact.q, Direction::kExtending);
+  for (const ExpectedContact& contact : expectedContacts(e.controller, e.plant.task)) {
+    const Loop loop = loopOf(e.controller, contact.q, Direction::kExtending);
     const double error = std::abs(
         impact(leaning(loop, contact, contact.leaning.stiffness), contact.speed).energy_error);
     if (out && !(error > most)) continue;
@@ -176,11 +176,11 @@ std::optional<ExpectedContact> hardestContact(const Experiment& e) {
 int drawMap(const Experiment& e, const MapAxis& x, const MapAxis& y,
             const std::filesystem::path& folder) {
   constexpr int kPoints = 41;
-  Loop original = loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kExtending);
+  Loop original = loopOf(e.controller, e.plant.task.initial_joints, Direction::kExtending);
   std::string pose = "robot as it stands", of_contact;
   double speed = 0.0;
   if (const auto contact = hardestContact(e)) {
-    original = leaning(loopOf(e.controller, e.plant, contact->q, Direction::kExtending), *contact,
+    original = leaning(loopOf(e.controller, contact->q, Direction::kExtending), *contact,
                        contact->leaning.stiffness);
     pose = "contact with " + contact->name;
     of_contact = ",energy_error";

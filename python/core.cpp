@@ -127,7 +127,7 @@ py::tuple admittanceStep(const ModalModel& base, const Eigen::VectorXd& eta,
 py::dict loopRoot(const Path& file, const Strings& overrides, const std::string& direction) {
   const Experiment e = loadExperiment(file, overrides);
   const DominantRoot root =
-      dominantRoot(loopOf(e.controller, e.plant, e.plant.initial_joints,
+      dominantRoot(loopOf(e.controller, e.plant.task.initial_joints,
                           direction == "extending"    ? Direction::kExtending
                           : direction == "retracting" ? Direction::kRetracting
                                                       : Direction::kSwinging));
@@ -141,7 +141,7 @@ py::dict loopRoot(const Path& file, const Strings& overrides, const std::string&
 
 py::dict loopMargins(const Path& file, const Strings& overrides) {
   const Experiment e = loadExperiment(file, overrides);
-  const LoopVerdict verdict = assessStability(e.controller, e.plant);
+  const LoopVerdict verdict = assessStability(e.controller, e.plant.task);
   py::dict out;
   out["stable"] = verdict.stable;
   out["why"] = verdict.stable ? "" : explain(verdict);

@@ -98,8 +98,9 @@ TEST(AppendixE, LimitIsAMassRatioOfOne) {  // (E.14): no damping, sampled ever f
 
 TEST(AppendixE, MassRatiosAreThoseOfPhysicalSpace) {  // (E.18) against (E.20)
   const Experiment e = test::experiment("puma_on_table_4_1");
-  const RigidBody robot = combine(RigidBody{}, e.plant.payload.X_PL0(),
-                                  compositeBody(carried(e.plant.payload), e.plant.initial_joints));
+  const RigidBody robot =
+      combine(RigidBody{}, e.plant.payload.X_PL0(),
+              compositeBody(carried(e.plant.payload), e.plant.task.initial_joints));
   Mat6 M = Mat6::Zero();
   M.diagonal() << 500, 500, 500, 250, 250, 250;
   VectorXd expected = eigenvalues(inverse(M) * spatialMass(robot)).real();
@@ -150,7 +151,7 @@ TEST(LoopModel, GrowsAsTheWholeSimulationDoes) {
   for (const Setting& setting : settings(count)) {
     Experiment e = test::experiment(setting.scenario, setting.set);
     const DominantRoot s =
-        dominantRoot(loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kSwinging));
+        dominantRoot(loopOf(e.controller, e.plant.task.initial_joints, Direction::kSwinging));
     // Growth is watched from 0.06 to 0.25 m/s, below what makes the envelope slow it; a decay from
     // 30 mm, or 0.25 m/s, until few counts are left.
     const double fast = 2.0 * M_PI * s.frequency;  // [rad/s]
@@ -165,7 +166,7 @@ TEST(LoopModel, GrowsAsTheWholeSimulationDoes) {
     program.segments[2].target = Pose::from(offset);
     program.segments[3] = test::segment(SegmentKind::kAdmittance, 15.0);
     program.size = 4;
-    e.plant.robot_events.clear();
+    e.plant.task.robot_events.clear();
 
     const ModalModel& base = e.controller.admittance;
     const MatrixXd to_modes = leastSquares(base.Phi, MatrixXd::Identity(6, 6));
@@ -231,7 +232,7 @@ TEST(LoopModel, SaysWhichRunsStopThemselves) {
     const Experiment e = test::experiment(
         c.scenario,
         {std::string("legs.filters=") + c.filters, "base.keep_modes=" + std::to_string(c.modes)});
-    EXPECT_EQ(stableModes(e.controller, e.plant, e.plant.initial_joints) == c.modes, c.stable)
+    EXPECT_EQ(stableModes(e.controller, e.plant.task.initial_joints) == c.modes, c.stable)
         << c.scenario;
     const RunResult result = runLockstep(e, nullptr, {});
     EXPECT_EQ(result.good(), c.stable) << c.scenario << " " << c.filters << " " << c.modes;
@@ -240,7 +241,7 @@ TEST(LoopModel, SaysWhichRunsStopThemselves) {
 
 TEST(LoopModel, MarginsEndWhereTheRootReachesOne) {
   const Experiment e = test::experiment("srms_unberth_puma", {"legs.filters=outputs"});
-  Loop loop = loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kExtending);
+  Loop loop = loopOf(e.controller, e.plant.task.initial_joints, Direction::kExtending);
   const Margins m = margins(loop);
   EXPECT_GT(m.gain, 1.05);
   Loop heavier = loop;
@@ -259,7 +260,7 @@ TEST(LoopModel, DelayOfATickIsALongerLag) {
   // At the softest mode a tick more of lag adds damping: r omega^2 T / (2 (1 + r)), Appendix E's
   // oscillator with the wrench late by T.
   const Experiment e = test::experiment("srms_unberth_puma", {"base.keep_modes=1"});
-  Loop loop = loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kExtending);
+  Loop loop = loopOf(e.controller, e.plant.task.initial_joints, Direction::kExtending);
   const double before = dominantRoot(loop).growth;
   loop.delay = 1;
   const DominantRoot after = dominantRoot(loop);

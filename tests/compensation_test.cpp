@@ -235,12 +235,12 @@ TEST_F(Emulation, GateHoldsForAllThatMayBeLearnt) {
                                   with({"sensor.noise=false", "base.keep_modes=6"}, kMean));
   const Compensation& c = e.controller.compensation;
   const double most = 1.0 + c.adaptation_limit;  // what was learnt here, the machine there
-  EXPECT_TRUE(isStable(e.controller, e.plant));
+  EXPECT_TRUE(isStable(e.controller, e.plant.task));
   Experiment limit = e;
   limit.controller.compensation.adaptation_limit = 2.0;
-  EXPECT_FALSE(isStable(limit.controller, limit.plant));
+  EXPECT_FALSE(isStable(limit.controller, limit.plant.task));
   limit.controller.compensation.adaptation = false;
-  EXPECT_TRUE(isStable(limit.controller, limit.plant));
+  EXPECT_TRUE(isStable(limit.controller, limit.plant.task));
   // The same by the machine itself, held as far from the belief as that: nothing grows.
   for (const double by : {-most, most}) {
     Experiment off = e;
@@ -362,8 +362,7 @@ TEST_F(Emulation, LoopModelKnowsTheCompensation) {
       const std::string what = std::string(scenario) + " " + std::to_string(error);
       Experiment e = experiment(scenario, kCompensated,
                                 {"base.keep_modes=6", "sensor.noise=false", "gravity_m_per_s2=0"});
-      const Loop right =
-          loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kSwinging);
+      const Loop right = loopOf(e.controller, e.plant.task.initial_joints, Direction::kSwinging);
 
       Experiment heavier = e;
       const auto scale = [&](RigidBody& body) {
@@ -398,7 +397,7 @@ TEST_F(Emulation, LoopModelKnowsAWrenchThatIsLaterThanBelieved) {
     for (const double late : {-3e-3, -2e-3, -1e-3, 1e-3, 2e-3, 3e-3}) {
       Experiment e =
           experiment("puma_on_table_4_1", kCompensated, with(lightBase(5.0, 1.0, 0.01), readings));
-      Loop loop = loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kSwinging);
+      Loop loop = loopOf(e.controller, e.plant.task.initial_joints, Direction::kSwinging);
       loop.late = late;
       const DominantRoot root = dominantRoot(loop);
       e.plant.sensor.cutoff = M_SQRT2 / (M_SQRT2 / e.plant.sensor.cutoff + late);
@@ -426,7 +425,7 @@ TEST_F(Emulation, GateHoldsForWhatTheBeliefMayBeOffBy) {
   const std::vector<std::string> base = lightBase(5.0, 3.0, 0.02);
   const Experiment e = assessed("puma_on_table_4_1", kCompensated, base);
   EXPECT_EQ(e.controller.stability, Stability::kUnstable);
-  const LoopVerdict v = assessStability(e.controller, e.plant);
+  const LoopVerdict v = assessStability(e.controller, e.plant.task);
   EXPECT_TRUE(v.as_believed);
   EXPECT_FALSE(v.stable);
   EXPECT_NE(explain(v).find("would decay as believed, but diverge with a wrench 0.5 ms earlier"),
@@ -457,11 +456,11 @@ TEST_F(Emulation, GateHoldsForWhatTheBeliefMayBeOffBy) {
                                      with(heavy, {"controller.compensation.timing_error_s=0",
                                                   "controller.compensation.gain_error=0.1",
                                                   "controller.compensation.mass_error=0.5"}));
-  const std::array<int, 3> corner = assessStability(both.controller, both.plant).off;
+  const std::array<int, 3> corner = assessStability(both.controller, both.plant.task).off;
   const auto growth = [&](double mass, double gain) {
     double most = -HUGE_VAL;
     for (const Direction direction : {Direction::kExtending, Direction::kRetracting}) {
-      Loop loop = loopOf(both.controller, both.plant, both.plant.initial_joints, direction);
+      Loop loop = loopOf(both.controller, both.plant.task.initial_joints, direction);
       loop.robot_P.mass *= 1.0 + 0.5 * mass;
       loop.robot_P.I_Bcm_B *= 1.0 + 0.5 * mass;
       loop.velocity_gain *= 1.0 + 0.1 * gain;

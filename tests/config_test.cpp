@@ -24,7 +24,7 @@ TEST(Config, EveryScenarioLoads) {
   for (const auto& entry : fs::directory_iterator(scenarios())) {
     const Experiment e = loadExperiment(entry.path());
     EXPECT_EQ(e.name, entry.path().stem());
-    EXPECT_GT(e.substitutes, 0);
+    EXPECT_GT(e.source.substitutes, 0);
     ++count;
   }
   EXPECT_GE(count, 7);
@@ -33,9 +33,9 @@ TEST(Config, EveryScenarioLoads) {
 TEST(Config, ResolvedTextReadsBackToTheSameExperiment) {
   for (const auto& entry : fs::directory_iterator(scenarios())) {
     const Experiment e = loadExperiment(entry.path());
-    const Experiment back = parseExperiment(e.resolved, "resolved");
-    EXPECT_EQ(back.resolved, e.resolved);
-    EXPECT_EQ(back.hash, e.hash);
+    const Experiment back = parseExperiment(e.source.resolved, "resolved");
+    EXPECT_EQ(back.source.resolved, e.source.resolved);
+    EXPECT_EQ(back.source.hash, e.source.hash);
     EXPECT_EQ(back.controller.sensor.C_proc, e.controller.sensor.C_proc);
     EXPECT_EQ(back.controller.program.size, e.controller.program.size);
     EXPECT_EQ(back.robot.joint_names, e.robot.joint_names);

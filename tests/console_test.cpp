@@ -214,14 +214,14 @@ TEST_F(Console, AScriptCalibratesMovesCollectsAndParks) {
   const fs::path kept = folder_ / "ves-runs/calibration.yaml";
   const Experiment with =
       loadExperiment(test::configDir() + "/scenarios/puma_on_table_4_1.yaml", {}, kept);
-  ASSERT_TRUE(with.calibration);
-  EXPECT_EQ(with.controller.bias, with.calibration->bias);
-  EXPECT_LT(age(*with.calibration), 1.0);
+  ASSERT_TRUE(with.source.calibration);
+  EXPECT_EQ(with.controller.bias, with.source.calibration->bias);
+  EXPECT_LT(age(*with.source.calibration), 1.0);
   EXPECT_NE(test::refusal([&] {
               loadExperiment(test::configDir() + "/scenarios/z_sine.yaml", {}, kept);
             }).find("calibration.yaml:4: calibration.setup: "),
             std::string::npos);
-  CalibrationRecord old = *with.calibration;
+  CalibrationRecord old = *with.source.calibration;
   old.date -= 5 * 3600;
   std::ofstream(kept) << write(old);
   const Output next = sh(session("--do 'wait 0.1' --out b"));

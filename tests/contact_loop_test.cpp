@@ -175,12 +175,11 @@ TEST(ExpectedContacts, ReboundAsTheMachineDoes) {
     for (const double k : {2e3, 3e4}) {
       const Experiment e =
           meeting(100.0, k, compensated ? kCompensated : std::vector<std::string>());
-      const std::vector<ExpectedContact> all = expectedContacts(e.controller, e.plant);
+      const std::vector<ExpectedContact> all = expectedContacts(e.controller, e.plant.task);
       ASSERT_EQ(all.size(), 1U);
       EXPECT_EQ(all[0].name, "target");
       EXPECT_NEAR(all[0].speed, 0.05, 1e-12);
-      const Loop loop =
-          leaning(loopOf(e.controller, e.plant, all[0].q, Direction::kSwinging), all[0], k);
+      const Loop loop = leaning(loopOf(e.controller, all[0].q, Direction::kSwinging), all[0], k);
       const Impact foretold = impact(loop, all[0].speed);
       Lockstep machine(e.controller, e.plant);
       machine.step({Request::kStart, {}, {}});
@@ -208,7 +207,7 @@ TEST(ExpectedContacts, AreFoundWhereTheRobotGoes) {
       "joint_2, to_deg_or_m: -80, duration_s: 2}}]}}, {{admittance: "
       "{{duration_s: 1}}}}]";
   const Experiment there = e(fmt::format(fmt::runtime(leads), "admittance", ""));
-  const std::vector<ExpectedContact> all = expectedContacts(there.controller, there.plant);
+  const std::vector<ExpectedContact> all = expectedContacts(there.controller, there.plant.task);
   ASSERT_EQ(all.size(), 1U);
   EXPECT_EQ(all[0].name, "bodies[0]");
   EXPECT_GT(all[0].speed, 0.02);
@@ -216,14 +215,14 @@ TEST(ExpectedContacts, AreFoundWhereTheRobotGoes) {
   EXPECT_EQ(all[0].leaning.stiffness, 2000.0);
   EXPECT_LT((all[0].leaning.direction.head<3>() + Vec3::UnitX()).norm(), 1e-9);
   // The damper has the law's restitution at that speed.
-  const Loop loop = leaning(loopOf(there.controller, there.plant, all[0].q, Direction::kSwinging),
-                            all[0], 2000.0);
+  const Loop loop =
+      leaning(loopOf(there.controller, all[0].q, Direction::kSwinging), all[0], 2000.0);
   const double zeta = loop.contact->damping / (2.0 * std::sqrt(2000.0 * meetingMass(loop)));
   EXPECT_NEAR(std::exp(-M_PI * zeta / std::sqrt(1.0 - zeta * zeta)),
-              restitution(there.plant.world->environment.law, all[0].speed), 1e-9);
+              restitution(there.plant.task.world->environment.law, all[0].speed), 1e-9);
   // Without admittance control nothing answers.
   const Experiment elsewhere = test::experiment("puma_on_table_4_1");
-  EXPECT_TRUE(expectedContacts(elsewhere.controller, elsewhere.plant).empty());
+  EXPECT_TRUE(expectedContacts(elsewhere.controller, elsewhere.plant.task).empty());
 }
 
 // A target that is far off may come near, and one that is near may be on its way from there.
@@ -234,7 +233,7 @@ TEST(ExpectedContacts, FollowATargetOnItsWay) {
                 {"program=[{move: {}}, {calibration: {}}, {admittance: {duration_s: 3}}]",
                  fmt::format("environment.target.from_tool_m=[{}, 0, 0]", away),
                  fmt::format("environment.target.velocity_m_per_s=[{}, 0, 0]", speed)});
-    return expectedContacts(e.controller, e.plant);
+    return expectedContacts(e.controller, e.plant.task);
   };
   const std::vector<ExpectedContact> comes = found(0.45, -0.06);  // touches after 2.2 s
   ASSERT_EQ(comes.size(), 1U);
@@ -246,7 +245,7 @@ TEST(ExpectedContacts, FollowATargetOnItsWay) {
 // A grip holds the target at its centre, where the plant has it then.
 TEST(ExpectedContacts, HoldTheTargetWhereThePlantDoes) {
   const Experiment e = test::experiment("contact_capture_puma");
-  const std::vector<ExpectedContact> all = expectedContacts(e.controller, e.plant);
+  const std::vector<ExpectedContact> all = expectedContacts(e.controller, e.plant.task);
   Lockstep machine(e.controller, e.plant);
   machine.step({Request::kStart, {}, {}});
   while (!machine.plant().truth().target.X_TB && !test::done(machine.state())) machine.step();
@@ -284,9 +283,9 @@ TEST(ContactGate, RefusesWhatWouldGrow) {
     for (const std::string& one : set)
       if (one.rfind("controller.c", 0) == 0 || one.rfind("sensor", 0) == 0 ||
           one.rfind("controller.p", 0) == 0)
-        applyOverride(e.document, one);
-    Experiment again = buildExperiment(e.document);
-    return applyStabilityCheck(again.controller, again.plant);
+        applyOverride(e.source.document, one);
+    Experiment again = buildExperiment(e.source.document);
+    return applyStabilityCheck(again.controller, again.plant.task);
   };
   const std::string grows = verdict(3e4, {});
   EXPECT_NE(grows.find("contact with target, 3e+04 N/m"), std::string::npos) << grows;
@@ -299,7 +298,7 @@ TEST(ContactGate, RefusesWhatWouldGrow) {
 
 TEST(ContactGate, SaysHowStiffItMayBe) {
   const Experiment e = meeting(100.0, 2e3, kCompensated);
-  const std::vector<ContactVerdict> all = assessContacts(e.controller, e.plant);
+  const std::vector<ContactVerdict> all = assessContacts(e.controller, e.plant.task);
   ASSERT_EQ(all.size(), 1U);
   const ContactVerdict& v = all[0];
   EXPECT_FALSE(v.grows);
@@ -310,11 +309,10 @@ TEST(ContactGate, SaysHowStiffItMayBe) {
   const auto error = [&](double k) {
     double most = 0.0;
     for (const Direction d : {Direction::kExtending, Direction::kRetracting})
-      most = std::max(
-          most,
-          std::abs(impact(leaning(loopOf(e.controller, e.plant, v.contact.q, d), v.contact, k),
-                          v.contact.speed)
-                       .energy_error));
+      most = std::max(most,
+                      std::abs(impact(leaning(loopOf(e.controller, v.contact.q, d), v.contact, k),
+                                      v.contact.speed)
+                                   .energy_error));
     return most;
   };
   EXPECT_LE(error(v.limits.energy), kMostEnergyError);

@@ -5,12 +5,12 @@
 
 #include "support/refusal.hpp"
 #include "support/rig.hpp"
-#include "ves/run/truth.hpp"
 #include "ves/bus/messages.hpp"
 #include "ves/config/experiment.hpp"
 #include "ves/plant/plant.hpp"
 #include "ves/results/contacts.hpp"
 #include "ves/results/summary.hpp"
+#include "ves/run/truth.hpp"
 #include "ves/srms/interaction.hpp"
 
 namespace ves {
@@ -33,7 +33,7 @@ Experiment meeting(double stiffness, const std::string& contact = "",
 
 /// The plant by itself, without a program that would let the target go.
 plant::Plant alone(Experiment e) {
-  e.plant.world->release = -1;
+  e.plant.task.world->release = -1;
   return plant::Plant(e.plant);
 }
 
@@ -110,11 +110,11 @@ TEST(ContactInThePlant, APressedBoardPushesAsDeepAsTheToolIsIn) {
   plant::Plant plant = alone(e);
   RobotMove move;
   move.joint = 1;
-  move.target = e.plant.initial_joints(1) - 0.2;
+  move.target = e.plant.task.initial_joints(1) - 0.2;
   move.duration = 1.0;
   ASSERT_TRUE(plant.moveRobot(move));
   const Payload& payload = e.plant.payload;
-  const FixedBody& board = e.plant.world->environment.bodies[0];
+  const FixedBody& board = e.plant.task.world->environment.bodies[0];
   const Vec3 out = board.X_IB.R.col(2);
   int touched = 0;
   for (int i = 1; i <= 1500; ++i) {
@@ -139,11 +139,11 @@ TEST(ContactInThePlant, WhatFloatsIsLetGoWhenAdmittanceControlBegins) {
   Experiment e = meeting(300.0, "",
                          {"environment.target.from_tool_m=[0.6, 0, 0]",
                           fmt::format("environment.target.velocity_m_per_s=[{}, 0, 0]", -speed)});
-  ASSERT_EQ(e.plant.world->release, 3);
+  ASSERT_EQ(e.plant.task.world->release, 3);
   ASSERT_EQ(applyStabilityCheck(e), "");
   Lockstep machine(e.controller, e.plant);
   machine.step({Request::kStart, {}, {}});
-  const Vec3 start = e.plant.world->environment.target->start.p;
+  const Vec3 start = e.plant.task.world->environment.target->start.p;
   double began = -1.0;
   int drifted = 0;
   bool met = false;
@@ -171,12 +171,12 @@ TEST(ContactInThePlant, WhatIsHeldStands) {
   plant::Plant plant(e.plant);  // no program lets it go
   RobotMove move;
   move.joint = 1;
-  move.target = e.plant.initial_joints(1) + 0.03;
+  move.target = e.plant.task.initial_joints(1) + 0.03;
   ASSERT_TRUE(plant.moveRobot(move));
   plant.advance(2'000'000'000);
   plant.sample();
   const plant::Truth& t = plant.truth();
-  EXPECT_EQ(t.target.p, e.plant.world->environment.target->start.p);
+  EXPECT_EQ(t.target.p, e.plant.task.world->environment.target->start.p);
   ASSERT_LT(t.clearance, -0.01);
   EXPECT_NEAR(t.contact_To_I.f.norm(), 300.0 * -t.clearance, 1e-3 * t.contact_To_I.f.norm());
 }
@@ -237,7 +237,7 @@ TEST(ContactInFreeSpace, TwoMassesPartAsTheyMet) {
 // Nothing is anchored: momentum, moment of momentum and energy of base, robot and target.
 TEST(ContactInFreeSpace, NothingIsLostWithoutAnAnchor) {
   Experiment e = meeting(2e3);
-  e.plant.world->environment.target->start.p += Vec3(0.0, 0.08, 0.05);  // off centre
+  e.plant.task.world->environment.target->start.p += Vec3(0.0, 0.08, 0.05);  // off centre
   const double base = 400.0, inertia = 60.0;
   const Interaction i = afloat(e, base, inertia);
   const RigidBody robot_P =

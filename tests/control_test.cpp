@@ -132,7 +132,7 @@ TEST(GravityCompensation, VanishesInSpace) {
   const Experiment e = experiment("puma_tilt");
   const Mat3 R_IP = rotation({0.3, 0.2, 0.1});
   const Wrench F_So_S =
-      staticWrench(e.controller.payload, e.plant.initial_joints, R_IP, Vec3::Zero());
+      staticWrench(e.controller.payload, e.plant.task.initial_joints, R_IP, Vec3::Zero());
   EXPECT_EQ(gravityCompensation(e.controller.payload, R_IP, F_So_S).stacked().norm(), 0.0);
 }
 

@@ -35,7 +35,7 @@ TEST(Differences, NameTheLeavesThatWereChanged) {
   EXPECT_EQ(configurationDifferences({&a, &b, &c}).size(), 3u);
   // Long texts are told apart, not shown.
   Experiment d = a;
-  d.document.find("robot")->find("urdf_text")->text += " ";
+  d.source.document.find("robot")->find("urdf_text")->text += " ";
   const auto of_urdf = configurationDifferences({&a, &d});
   ASSERT_EQ(of_urdf.size(), 1u);
   EXPECT_EQ(of_urdf[0].key, "robot.urdf_text");

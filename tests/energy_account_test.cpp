@@ -159,7 +159,7 @@ struct Books {
 Books books(const Experiment& e) {
   const Mat6 M_1 =
       spatialMass(combine(RigidBody{}, e.plant.payload.X_PL0(),
-                          compositeBody(carried(e.plant.payload), e.plant.initial_joints)));
+                          compositeBody(carried(e.plant.payload), e.plant.task.initial_joints)));
   const Eigen::MatrixXd inverse = leastSquares(e.controller.admittance.Phi, Mat6::Identity());
   Lockstep machine(e.controller, e.plant);
   machine.step({Request::kStart, {}, {}});
@@ -180,7 +180,7 @@ Books books(const Experiment& e) {
     if (ticks != 190) continue;
     const Vec6 x_dot = (t.x.stacked() - begun) / (20 * e.controller.periodSeconds());
     const Eigen::VectorXd eta_dot = inverse * x_dot;
-    const Target& ball = *e.plant.world->environment.target;
+    const Target& ball = *e.plant.task.world->environment.target;
     out.energy =
         0.5 * (eta_dot.squaredNorm() + x_dot.dot(M_1 * x_dot) +
                ball.mass * t.target.v.squaredNorm() + t.target.w.dot(ball.I_Bcm_B * t.target.w)) -

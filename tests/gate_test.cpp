@@ -18,7 +18,7 @@ const std::vector<std::string> kDiverging = {"base.keep_modes=6", "legs.filters=
 
 TEST(Gate, NamesWhatGrowsAndWhatItNamesCuresIt) {
   const Experiment e = test::experiment("srms_deploy_doss", kDiverging);
-  const LoopVerdict v = assessStability(e.controller, e.plant);
+  const LoopVerdict v = assessStability(e.controller, e.plant.task);
   ASSERT_FALSE(v.stable);
   EXPECT_GT(v.worst.growth, 0.0);
   const std::string said = explain(v);
@@ -28,7 +28,7 @@ TEST(Gate, NamesWhatGrowsAndWhatItNamesCuresIt) {
     std::vector<std::string> all = kDiverging;
     all.push_back(set);
     const Experiment cured = test::experiment("srms_deploy_doss", all);
-    return isStable(cured.controller, cured.plant);
+    return isStable(cured.controller, cured.plant.task);
   };
   EXPECT_TRUE(with("base.keep_modes=" + std::to_string(v.stable_modes)));
   EXPECT_FALSE(with("base.keep_modes=" + std::to_string(v.stable_modes + 1)));
@@ -45,11 +45,11 @@ TEST(Gate, ItsWorstIsTheWorstOfAllPosesAndBothDirections) {
       {"program=[{admittance: {duration_s: 9}, robot: [{at_s: 1, duration_s: 1, joint: joint_4, "
        "to_deg_or_m: 0}, {at_s: 4, duration_s: 1, joint: joint_4, to_deg_or_m: 90}]}]"});
   for (const Experiment& e : {folds, test::experiment("srms_deploy_doss", kDiverging)}) {
-    const LoopVerdict v = assessStability(e.controller, e.plant);
+    const LoopVerdict v = assessStability(e.controller, e.plant.task);
     double most = 0.0, of_last = 0.0;
     for (const Direction direction : {Direction::kExtending, Direction::kRetracting})
-      for (const ProgramRobot& one : programRobots(e.controller, e.plant)) {
-        of_last = dominantRoot(loopOf(e.controller, e.plant, one.q, direction)).radius;
+      for (const ProgramRobot& one : programRobots(e.controller, e.plant.task)) {
+        of_last = dominantRoot(loopOf(e.controller, one.q, direction)).radius;
         most = std::max(most, of_last);
       }
     EXPECT_NEAR(v.worst.radius, most, 1e-9) << e.name;
@@ -62,7 +62,7 @@ TEST(Gate, ItsWorstDirectionIsThatOfTheFasterLegs) {  // the servo that follows 
     const Experiment e =
         test::experiment("doss_on_table_4_1", {"legs.gain_extend_in_per_s_per_ma=" + extend,
                                                "legs.gain_retract_in_per_s_per_ma=" + retract});
-    const LoopVerdict v = assessStability(e.controller, e.plant);
+    const LoopVerdict v = assessStability(e.controller, e.plant.task);
     EXPECT_TRUE(v.stable);
     const Loop& loop = v.direction == Direction::kExtending ? v.extending : v.retracting;
     EXPECT_NEAR(v.worst.radius, radius(loop), 1e-9);
@@ -74,7 +74,7 @@ TEST(Gate, ItsWorstDirectionIsThatOfTheFasterLegs) {  // the servo that follows 
 
 TEST(LoopModel, AnUndampedBaseAloneNeitherGrowsNorDecays) {  // its roots are on the unit circle
   const Experiment e = test::experiment("puma_on_table_4_1");
-  Loop loop = loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kExtending);
+  Loop loop = loopOf(e.controller, e.plant.task.initial_joints, Direction::kExtending);
   loop.robot_P = RigidBody{};
   loop.base.damping.setZero();
   const Eigen::VectorXd stiffness = loop.base.stiffness;
@@ -92,7 +92,7 @@ TEST(Gate, LooksAtEveryPoseOfTheRobot) {
     Experiment e = test::experiment("doss_on_table_4_1",
                                     {"program=[{admittance: {duration_s: 5}" + robot + "}]"});
     e.controller.admittance.Phi *= lighter;
-    return isStable(e.controller, e.plant);
+    return isStable(e.controller, e.plant.task);
   };
   double lo = 1.0, hi = 100.0;
   ASSERT_TRUE(stable(lo, ""));
@@ -152,7 +152,7 @@ TEST(Gate, LooksAtThePosesBetweenTheEndsOfAMove) {
          "program=[{move: {}}, {admittance: {duration_s: 20}, robot: [{at_s: 1, duration_s: 15, "
          "joint: joint_3, to_deg_or_m: " +
              to + "}]}]"});
-    return isStable(e.controller, e.plant);
+    return isStable(e.controller, e.plant.task);
   };
   EXPECT_TRUE(stable("-180"));
   EXPECT_FALSE(stable("0"));
@@ -162,7 +162,7 @@ TEST(Gate, LooksAtThePosesBetweenTheEndsOfAMove) {
 TEST(Gate, ALoadThatNobodyToldOfIsNotCompensated) {
   Experiment e = test::experiment("srms_deploy_doss", {"controller.compensation.observer=true",
                                                        "controller.compensation.inertia=true"});
-  const Loop loop = loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kExtending);
+  const Loop loop = loopOf(e.controller, e.plant.task.initial_joints, Direction::kExtending);
   const RigidBody light = loop.robot_P, heavy = heavier(3.0, light);
   Loop untold = loop;
   untold.robot_P = heavy;
@@ -181,7 +181,7 @@ TEST(Gate, LooksAtEachMotionWhateverElseThereIs) {
        "joint: joint_3, to_deg_or_m: 60}, {at_s: 4, duration_s: 1, joint: joint_1, to_deg_or_m: "
        "0}, "
        "{at_s: 1, duration_s: 1, joint: joint_1, to_deg_or_m: 100}]}]"});
-  const auto poses = programRobots(e.controller, e.plant);
+  const auto poses = programRobots(e.controller, e.plant.task);
   const auto near = [&](int joint, double degrees) {
     return std::any_of(poses.begin(), poses.end(), [&](const ProgramRobot& one) {
       return std::abs(one.q(joint) / kDegree - degrees) < 8.0;
@@ -197,13 +197,13 @@ TEST(Gate, LooksAtEachMotionWhateverElseThereIs) {
 TEST(Gate, TakesTheRobotAsTheControllerKnowsIt) {
   Experiment e = test::experiment("srms_deploy_doss", kDiverging);
   e.plant.payload.robot = RobotModel();  // what a URDF without masses would say
-  EXPECT_FALSE(isStable(e.controller, e.plant));
+  EXPECT_FALSE(isStable(e.controller, e.plant.task));
 }
 
 TEST(Gate, LetsAFreeBaseDriftAndStillNamesCures) {
   const auto verdict = [](std::vector<std::string> sets) {
     const Experiment e = test::experiment("puma_on_table_4_1", std::move(sets));
-    return assessStability(e.controller, e.plant);
+    return assessStability(e.controller, e.plant.task);
   };
   EXPECT_TRUE(
       verdict({"base.stiffness_diagonal=[0,0,0,0,0,0]", "base.damping_diagonal=[0,0,0,0,0,0]"})
@@ -217,7 +217,7 @@ TEST(Gate, LetsAFreeBaseDriftAndStillNamesCures) {
 
 TEST(Margins, OfARobotWithoutMassAreTheMostThatIsLookedFor) {
   const Experiment e = test::experiment("free_decay");
-  Loop loop = loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kExtending);
+  Loop loop = loopOf(e.controller, e.plant.task.initial_joints, Direction::kExtending);
   loop.robot_P = RigidBody{};
   const Margins m = margins(loop);
   EXPECT_EQ(m.gain, Margins::kMostGain);
@@ -227,7 +227,7 @@ TEST(Margins, OfARobotWithoutMassAreTheMostThatIsLookedFor) {
 TEST(Gate, ScenariosOfTheRepositoryPass) {
   for (const auto& entry : std::filesystem::directory_iterator(test::configDir() + "/scenarios")) {
     const Experiment e = loadExperiment(entry.path());
-    EXPECT_TRUE(isStable(e.controller, e.plant)) << entry.path();
+    EXPECT_TRUE(isStable(e.controller, e.plant.task)) << entry.path();
   }
 }
 
@@ -251,7 +251,7 @@ TEST(LoopModel, BasesKeepTheModesThatTheRuleGives) {
         const auto set = std::string("legs.filters=") + filters;
         kept = static_cast<int>(test::experiment(name).controller.admittance.stiffness.size());
         const Experiment e = test::experiment(name, {set, "base.keep_modes=8"});
-        stable = std::min(stable, stableModes(e.controller, e.plant, e.plant.initial_joints));
+        stable = std::min(stable, stableModes(e.controller, e.plant.task.initial_joints));
       }
     EXPECT_EQ(kept, stable) << configuration;
   }
@@ -261,7 +261,7 @@ TEST(Gate, NothingOfTheSimulatedMachineChangesItsVerdict) {
   // Every key that makes the plant another one than is believed.
   const auto verdict = [](const std::vector<std::string>& set) {
     const Experiment e = test::experiment("puma_on_table_4_1", test::kCompensated, set);
-    const LoopVerdict v = assessStability(e.controller, e.plant);
+    const LoopVerdict v = assessStability(e.controller, e.plant.task);
     return std::tuple(v.stable, v.as_believed, v.worst.radius, v.worst.frequency);
   };
   const auto as_believed = verdict({});
@@ -272,10 +272,10 @@ TEST(Gate, NothingOfTheSimulatedMachineChangesItsVerdict) {
 TEST(Gate, LooksAtTheServosThatWereIdentified) {
   Experiment e = test::experiment("puma_on_table_4_1", test::kCompensated);
   const double nominal =
-      loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kExtending).velocity_gain;
+      loopOf(e.controller, e.plant.task.initial_joints, Direction::kExtending).velocity_gain;
   e.controller.servo.extend *= 0.75;
   EXPECT_NEAR(
-      loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kExtending).velocity_gain,
+      loopOf(e.controller, e.plant.task.initial_joints, Direction::kExtending).velocity_gain,
       0.75 * nominal, 1e-12 * nominal);
 }
 

@@ -168,7 +168,7 @@ TEST(Identification, ParametersAreWithinThreeDeviationsInNinetyNinePercent) {
     const Experiment e = test::experiment(name);
     const StaticSetup setup = staticSetup(e.controller);
     const SeparableCombinations c = separableCombinations(setup.robot);
-    const PosePlan plan = planPoses(setup, c, e.controller, e.plant.initial_joints, {});
+    const PosePlan plan = planPoses(setup, c, e.controller, e.plant.task.initial_joints, {});
     const VectorXd truth = c.C * massParameters(setup.robot);
     constexpr int kSeeds = 200;
     int within = 0, of = 0;
@@ -192,7 +192,7 @@ TEST(Identification, BiasIsThatOfTheMiddleOfTheRests) {  // where its drift has 
   const Experiment e = test::experiment("puma_on_table_4_1");
   const StaticSetup setup = staticSetup(e.controller);
   const SeparableCombinations c = separableCombinations(setup.robot);
-  const PosePlan plan = planPoses(setup, c, e.controller, e.plant.initial_joints, {});
+  const PosePlan plan = planPoses(setup, c, e.controller, e.plant.task.initial_joints, {});
   std::vector<StaticInterval> rests = readings(e, setup, plan, 1);
   const MassEstimate before = estimateMasses(setup, c, rests);
   double middle = 0.0;
@@ -209,7 +209,7 @@ TEST(Identification, ResidualIsWhatTheRestsScatterByChannel) {
   const Experiment e = test::experiment("puma_on_table_4_1");
   const StaticSetup setup = staticSetup(e.controller);
   const SeparableCombinations c = separableCombinations(setup.robot);
-  const PosePlan plan = planPoses(setup, c, e.controller, e.plant.initial_joints, {});
+  const PosePlan plan = planPoses(setup, c, e.controller, e.plant.task.initial_joints, {});
   std::vector<StaticInterval> rests = readings(e, setup, plan, 1);
   std::mt19937 draw(2);
   std::normal_distribution<double> n(0.0, 20.0);  // far above the sensor's own
@@ -226,7 +226,7 @@ TEST(Identification, SaysWhichParametersAreMixed) {
   const SeparableCombinations c = separableCombinations(setup.robot);
   PosePlanOptions little;
   little.tilt = 0.5 * kDegree;
-  const PosePlan plan = planPoses(setup, c, e.controller, e.plant.initial_joints, little);
+  const PosePlan plan = planPoses(setup, c, e.controller, e.plant.task.initial_joints, little);
   const MassEstimate m = estimateMasses(setup, c, readings(e, setup, plan, 1));
   EXPECT_GT(m.inflation(0), MassEstimate::kMixed);  // m0 + m1 + ..
   EXPECT_LT(m.inflation(c.rank() - 1), MassEstimate::kMixed);

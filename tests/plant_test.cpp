@@ -97,7 +97,7 @@ TEST(Plant, FirstSampleShowsTheInitialPose) {
 TEST(Plant, RestsInsideTheConvertersRangeInEveryScenario) {
   for (const auto& file : std::filesystem::directory_iterator(test::configDir() + "/scenarios")) {
     const Experiment e = loadExperiment(file.path());
-    EXPECT_TRUE(e.warnings.empty()) << e.name << ": " << e.warnings[0];
+    EXPECT_TRUE(e.source.warnings.empty()) << e.name << ": " << e.source.warnings[0];
     for (const int count : Plant(e.plant).sample().adc)
       EXPECT_LT(std::abs(count), 0.9 * 32767) << e.name;
   }
@@ -110,13 +110,13 @@ TEST(Plant, WarnsOfTheChannelThatTheWeightFills) {
                                     {fmt::format("sensor.gain=[500, 500, 500, {}, 500, 500]", gain),
                                      "sensor.noise=false", "sensor.bias_v=[0, 0, 0, 0, 0, 0]"});
     const double percent = 100.0 * std::abs(Plant(e.plant).sample().adc[3]) / 32767;
-    ASSERT_EQ(e.warnings.size(), percent > 90 ? 1u : 0u) << percent;
+    ASSERT_EQ(e.source.warnings.size(), percent > 90 ? 1u : 0u) << percent;
     if (percent > 90) {
-      EXPECT_NE(
-          e.warnings[0].find(fmt::format("takes {:.0f} % of the range of channel mx", percent)),
-          std::string::npos)
-          << e.warnings[0] << " where the plant reads " << percent;
-      EXPECT_NE(e.warnings[0].find("sensor.gain[3]"), std::string::npos);
+      EXPECT_NE(e.source.warnings[0].find(
+                    fmt::format("takes {:.0f} % of the range of channel mx", percent)),
+                std::string::npos)
+          << e.source.warnings[0] << " where the plant reads " << percent;
+      EXPECT_NE(e.source.warnings[0].find("sensor.gain[3]"), std::string::npos);
       ++warned;
     }
   }
@@ -242,7 +242,7 @@ TEST(Plant, ARobotThatHasMovedAndStandsWeighsWhatItDoesThere) {
     return (t.F_Po_I - F_Po_I).stacked().norm() / F_Po_I.f.norm();
   };
   EXPECT_LT(weighs(), 1e-9);
-  ASSERT_TRUE(plant.moveRobot(RobotMove{1, e.plant.initial_joints(1) - 0.6, 1.0}));
+  ASSERT_TRUE(plant.moveRobot(RobotMove{1, e.plant.task.initial_joints(1) - 0.6, 1.0}));
   EXPECT_LT(weighs(), 1e-9);
   RigidBody load;
   load.mass = 3.0;
@@ -269,7 +269,7 @@ TEST(Plant, JointsFollowAFifthOrderPolynomial) {
 
 TEST(Plant, CuesCountFromTheSegmentsFirstCommand) {
   Experiment e = experiment("puma_on_table_4_1");
-  e.plant.robot_events = {{{2, 500'000'000}, RobotMove{0, 0.5, 1.0}}};
+  e.plant.task.robot_events = {{{2, 500'000'000}, RobotMove{0, 0.5, 1.0}}};
   e.plant.faults = {{{2, 300'000'000}, 100'000'000, plant::Fault::kFloorMat}};
   Plant plant(e.plant);
   LegCommand command;

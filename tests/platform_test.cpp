@@ -10,6 +10,7 @@
 #include "ves/config/experiment.hpp"
 #include "ves/config/platform.hpp"
 #include "ves/plant/lockstep.hpp"
+#include "ves/plant/nominal_servo.hpp"
 
 namespace ves {
 namespace {
@@ -174,7 +175,8 @@ TEST(AnyPlatform, AnglesAndGapsAreThoseOfElementaryGeometry) {
 // 40 mA through 1.18 and 0.77 in/s/mA; velocity gains of 17.4 and 11.3 1/s.
 TEST(AnyPlatform, SpeedAndErrorsFollowFromTheSlowerDirection) {
   const Platform p = shipped("z_sine");
-  const SafetyLimits l = derivedLimits(p.use, p.gains, p.actuator, p.transducer);
+  const SafetyLimits l = derivedLimits(p.use, {p.actuator.length_min, p.actuator.length_max},
+                                       plant::nominalServo(p.gains, p.actuator, p.transducer));
   const double speed = 0.95 * 0.77 * 40.0 * kMetrePerInch;  // [m/s]
   EXPECT_NEAR(l.leg_velocity, speed, 1e-3 * speed);
   EXPECT_NEAR(l.position_error, 1.5 * speed / 11.3, 0.01 * l.position_error);

@@ -21,8 +21,8 @@ PosePlan quickPlan(const Experiment& e) {
   const StaticSetup setup = staticSetup(e.controller);
   PosePlanOptions few;
   few.exchanges = 50;
-  return planPoses(setup, separableCombinations(setup.robot), e.controller, e.plant.initial_joints,
-                   few);
+  return planPoses(setup, separableCombinations(setup.robot), e.controller,
+                   e.plant.task.initial_joints, few);
 }
 
 TEST(PosePlan, StaysInRangesThatLieFarOff) {
@@ -78,10 +78,10 @@ TEST(PosePlan, ItsScenarioMovesNoJointFasterThanAsked) {
                                     test::configDir() + "/scenarios/doss_on_table_4_1.yaml", speed);
   const Experiment planned = loadExperiment(file);
   std::filesystem::remove(file);
-  JointVector at = planned.plant.initial_joints;
+  JointVector at = planned.plant.task.initial_joints;
   double fastest = 0.0;
-  ASSERT_GT(planned.plant.robot_events.size(), 100u);
-  for (const plant::RobotEvent& event : planned.plant.robot_events) {
+  ASSERT_GT(planned.plant.task.robot_events.size(), 100u);
+  for (const RobotEvent& event : planned.plant.task.robot_events) {
     const RobotMove& move = std::get<RobotMove>(event.action);
     const int i = move.joint;
     const bool turns = e.controller.payload.robot.jointLink(i).type == JointType::kRevolute;
@@ -101,7 +101,7 @@ TEST(PosePlan, KeepsTheLegsApartAndInsideTheirStroke) {
   const auto least = [&] {
     const StaticSetup setup = staticSetup(e.controller);
     const PosePlan plan = planPoses(setup, separableCombinations(setup.robot), e.controller,
-                                    e.plant.initial_joints, wide);
+                                    e.plant.task.initial_joints, wide);
     double shortest = HUGE_VAL;
     for (const PosePlan::Attitude& a : plan.attitudes) {
       const Transform X = e.controller.geometry.fromHome({Vec3::Zero(), a.rpy});
@@ -120,7 +120,7 @@ TEST(PosePlan, IsBetterThanChanceAndInsideTheLimits) {
   const StaticSetup setup = staticSetup(e.controller);
   const SeparableCombinations c = separableCombinations(setup.robot);
   const PosePlanOptions options;
-  const PosePlan plan = planPoses(setup, c, e.controller, e.plant.initial_joints, options);
+  const PosePlan plan = planPoses(setup, c, e.controller, e.plant.task.initial_joints, options);
   EXPECT_LT(plan.condition, 0.8 * plan.condition_random);
   ASSERT_EQ(plan.attitudes.size(), 16u);
   for (const PosePlan::Attitude& a : plan.attitudes) {

@@ -105,11 +105,9 @@ TEST(VesOnTheArm, RingsDownAsTheModelOfItsLoopSays) {
     const Experiment e = test::experiment("srms_unberth_doss", with);
     const RingDown fit = ringDown(commanded(recordLockstep(e).series), softest_mode);
     const double decay = fit.damping_ratio * 2 * M_PI * fit.frequency;
-    const JointVector& q = e.plant.initial_joints;
-    const double slow =
-        -dominantRoot(loopOf(e.controller, e.plant, q, Direction::kExtending)).growth;
-    const double fast =
-        -dominantRoot(loopOf(e.controller, e.plant, q, Direction::kRetracting)).growth;
+    const JointVector& q = e.plant.task.initial_joints;
+    const double slow = -dominantRoot(loopOf(e.controller, q, Direction::kExtending)).growth;
+    const double fast = -dominantRoot(loopOf(e.controller, q, Direction::kRetracting)).growth;
     EXPECT_GT(decay, 0.95 * slow) << filters;
     EXPECT_LT(decay, 1.05 * fast) << filters;
   }

@@ -23,7 +23,7 @@ class Bench {
       : e_(experiment(scenario, set)), platform_(e_.controller) {
     const Geometry& g = e_.controller.geometry;
     in_.sample.legs = legCounts(e_.controller.legs, legLengths(g, g.fromHome(found)));
-    in_.sample.q = e_.plant.initial_joints;
+    in_.sample.q = e_.plant.task.initial_joints;
     in_.sample.switches = kAllSwitchesClosed;
     in_.sample.adc[6] = (e_.controller.safety.pressure_min + e_.controller.safety.pressure_max) / 2;
     in_.order.request = Request::kStart;
@@ -132,7 +132,7 @@ TEST_P(Trips, LatchesAndHoldsTheLastCheckedLengths) {
   EXPECT_TRUE(state.command.engaged);
   // The cause goes away; the stop stays.
   bench.in().sample.switches = kAllSwitchesClosed;
-  bench.in().sample.q = bench.experimentUsed().plant.initial_joints;
+  bench.in().sample.q = bench.experimentUsed().plant.task.initial_joints;
   bench.in().conflicting_node = false;
   for (int i = 0; i < 100; ++i) {
     bench.in().sample.legs = last;

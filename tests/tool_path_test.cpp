@@ -321,8 +321,8 @@ TEST(ToolEvents, AreInTheAxesThatTheyName) {
     e = withEvents(
         "{at_s: 1, duration_s: 2, tool: {by: {position_m: [0.05, 0.02, -0.1]}, in: " + frame + "}}",
         move);
-    const JointVector& end = std::get<ToolMove>(e.plant.robot_events[0].action).joints->end();
-    return Vec3(toolOf(e, end).p - toolOf(e, e.plant.initial_joints).p);
+    const JointVector& end = std::get<ToolMove>(e.plant.task.robot_events[0].action).joints->end();
+    return Vec3(toolOf(e, end).p - toolOf(e, e.plant.task.initial_joints).p);
   };
   Experiment e;
   const Vec3 due(0.05, 0.02, -0.1);
@@ -331,8 +331,8 @@ TEST(ToolEvents, AreInTheAxesThatTheyName) {
   const Vec3 inertial = way("inertial", e);
   EXPECT_LT((rotation({0, 0, 10 * kDegree}) * e.plant.payload.X_PL0().R * inertial - due).norm(),
             1e-8);
-  ASSERT_FALSE(e.warnings.empty());
-  EXPECT_EQ(e.warnings.front(),
+  ASSERT_FALSE(e.source.warnings.empty());
+  EXPECT_EQ(e.source.warnings.front(),
             "program[3]: the tool path at 1 s is planned for a platform that stands where it is "
             "commanded: [0, 0, 0.05] m, [0, 0, 0.1745] rad");
 }
@@ -351,7 +351,7 @@ TEST(ToolEvents, ThePlantFollowsThePlan) {
       "{at_s: 0.5, speed_m_per_s: 0.1, tool: {by: {position_m: [0, 0.1, -0.1]}}}, {at_s: 4, "
       "duration_s: 1, joint: joint_1, to_deg_or_m: 0}",
       "", "monitor: {duration_s: 6, interval_s: 1}");
-  const auto& path = *std::get<ToolMove>(e.plant.robot_events[0].action).joints;
+  const auto& path = *std::get<ToolMove>(e.plant.task.robot_events[0].action).joints;
   plant::Plant plant(e.plant);
   holdIn(plant, 2);
   for (std::int64_t t = 0; t <= 5'500'000'000; t += 10'000'000) {
@@ -409,7 +409,7 @@ TEST(ToolEvents, RefuseInOneLine) {
 TEST(RobotOrders, APathIsPlannedBesideTheMachineFromWhereTheRobotIs) {
   const Experiment e = test::experiment("puma_on_table_4_1", {kPose});
   plant::Truth truth;
-  truth.joints.q = e.plant.initial_joints;
+  truth.joints.q = e.plant.task.initial_joints;
   truth.P.X = e.plant.geometry.fromHome({});
   truth.P.X.R = rotation({0.0, 0.0, 0.5});
   RobotOrders orders(e);
@@ -462,7 +462,7 @@ TEST(Grasp, ItsWeightIsOnTheSensorUntilItIsReleased) {
   EXPECT_NEAR(full.f.z() - empty.f.z(), -4.0 * 9.81, 1e-6);
   EXPECT_LT((again.stacked() - empty.stacked()).norm(), 1e-6);
   // Its moment about Po: r x F with r of the box's centre.
-  const Transform X_PT = e.plant.payload.X_PL0() * toolOf(e, e.plant.initial_joints);
+  const Transform X_PT = e.plant.payload.X_PL0() * toolOf(e, e.plant.task.initial_joints);
   const Vec3 r = plant.truth().P.X.R * (X_PT * Vec3(0.0, 0.0, 0.1));
   EXPECT_LT((full.n - empty.n - r.cross(Vec3(0.0, 0.0, -4.0 * 9.81))).norm(), 1e-4);
 }
@@ -475,7 +475,7 @@ TEST(Grasp, IsInTheToolsFrame) {  // a metre from the link that carries it
       "puma_on_table_4_1", {"robot.urdf=" + file.string(), "robot.joints_deg_or_m=[0, 0, 0]",
                             "program=[{move: {}, robot: [{at_s: 0, grasp: {" + kBox + "}}]}]"});
   std::filesystem::remove(file);
-  const auto& grasp = std::get<Grasp>(e.plant.robot_events.at(0).action);
+  const auto& grasp = std::get<Grasp>(e.plant.task.robot_events.at(0).action);
   EXPECT_EQ(grasp.link, 2);
   EXPECT_LT((grasp.body.p_BoBcm_B - Vec3(1.0, 0.0, 0.1)).norm(), 1e-12);
 }
@@ -498,7 +498,7 @@ TEST(Grasp, GravityCompensationKnowsItFromWhenItIsTold) {
 TEST(Grasp, IsTakenIntoTheLoopsJudgementBeforeAndAfterItIsTold) {
   const Experiment e = withEvents("{at_s: 1, grasp: {" + kBox +
                                   ", told_after_s: 0.5}}, {at_s: 3, release: {told_after_s: 0}}");
-  const auto robots = programRobots(e.controller, e.plant);
+  const auto robots = programRobots(e.controller, e.plant.task);
   std::vector<std::pair<double, double>> masses;  // [kg] that it has, that are known
   for (const ProgramRobot& one : robots) {
     const std::pair<double, double> now{one.body.robot_P.mass, one.body.known_P.mass};

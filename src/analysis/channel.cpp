@@ -121,7 +121,6 @@ MatrixXd throughPeriod(double period, std::vector<Event> events, const MatrixXd&
 /// second; Filter 3 where it is absent, the earlier readings where there is no derivative gain, the
 /// sums where the converter is read once.
 Channel channelOf(const Loop& loop, const std::optional<Leaning>& contact, MatrixXd* places) {
-  using plant::kTransducerPeriod, plant::kUpdatePeriod;
   constexpr Index kHeld = Mechanics::kSize, kFirst = kHeld + 1, kHistory = kFirst + 1,
                   kSum = kHistory + 4, kOther = kSum + 1, kForce = kOther + 2,
                   kForceSum = kForce + 2, kSize = kForceSum + 1,

@@ -52,10 +52,10 @@ double massAlong(const Loop& loop, const Vec6& d) {
 
 /// Every surface, ball by ball, that the tool or the target on its way may come near to; the target
 /// last. `gripped`: the robot as its hand closes on the target, if it does.
-std::vector<Nearest> nearestSurfaces(const ControllerConfig& controller,
-                                     const plant::PlantConfig& plant, const Transform& X_IP,
-                                     std::optional<JointVector>& gripped) {
-  const World& world = *plant.world;
+std::vector<Nearest> nearestSurfaces(const ControllerConfig& controller, const RobotTask& task,
+                                     const Transform& X_IP, std::optional<JointVector>& gripped) {
+  const World& world = *task.world;
+  const Payload& payload = controller.payload;
   const Environment& environment = world.environment;
   const std::size_t bodies = environment.bodies.size(), balls = environment.tool.size();
   std::vector<Nearest> nearest((bodies + 1) * balls);
@@ -81,14 +81,14 @@ std::vector<Nearest> nearestSurfaces(const ControllerConfig& controller,
       best.q = q;
     }
   };
-  MovingRobot robot(carried(plant.payload), plant.initial_joints);
-  std::int64_t origin = 0, released = world.release < 0 ? 0 : plant::Plant::kNever;  // [ns]
+  MovingRobot robot(carried(payload), task.initial_joints);
+  std::int64_t origin = 0, released = world.release < 0 ? 0 : INT64_MAX;  // [ns]
   for (int i = 0; i < controller.program.size; ++i) {
     const Segment& segment = controller.program.segments[static_cast<std::size_t>(i)];
     const auto duration = std::llround(segment.duration * 1e9);
     if (world.release == i) released = origin;
-    std::vector<plant::RobotEvent> events;
-    for (const plant::RobotEvent& event : plant.robot_events)
+    std::vector<RobotEvent> events;
+    for (const RobotEvent& event : task.robot_events)
       if (event.cue.segment == i) events.push_back(event);
     auto next = events.begin();
     for (std::int64_t now = 0; now <= duration; now += std::llround(kLook * 1e9)) {
@@ -99,8 +99,7 @@ std::vector<Nearest> nearestSurfaces(const ControllerConfig& controller,
       if (segment.kind != SegmentKind::kAdmittance) continue;
       const JointState joints = robot.at(origin + now);
       q = joints.q;
-      tool =
-          carriedFrame(robot.model(), joints, P, plant.payload.X_PL0(), world.link, world.X_link);
+      tool = carriedFrame(robot.model(), joints, P, payload.X_PL0(), world.link, world.X_link);
       for (std::size_t b = 0; b < bodies; ++b)
         look(b, environment.bodies[b].shape, environment.bodies[b].X_IB, Vec3::Zero());
       if (!environment.target || gripped) continue;
@@ -117,18 +116,16 @@ std::vector<Nearest> nearestSurfaces(const ControllerConfig& controller,
 }
 
 /// What the grip holds, along each axis of I and about it. It is held with its surface at the tool.
-std::vector<ExpectedContact> gripped(const plant::PlantConfig& plant, const Transform& X_IP,
-                                     const JointVector& q) {
-  const World& world = *plant.world;
+std::vector<ExpectedContact> gripped(const World& world, const Payload& payload,
+                                     const Transform& X_IP, const JointVector& q) {
   const Grip& grip = *world.environment.grip;
   const Target& target = *world.environment.target;
   BodyMotion P;
   P.X = X_IP;
   JointState joints;
   joints.q = q;
-  const Vec3 tool = carriedFrame(carried(plant.payload), joints, P, plant.payload.X_PL0(),
-                                 world.link, world.X_link)
-                        .X.p;
+  const Vec3 tool =
+      carriedFrame(carried(payload), joints, P, payload.X_PL0(), world.link, world.X_link).X.p;
   const Transform X_IB = target.start.X_IB();
   const Vec3 towards = target.start.p - tool;
   const double to_surface = proximity(target.shape, inverse(X_IB) * tool).distance;
@@ -154,12 +151,12 @@ std::vector<ExpectedContact> gripped(const plant::PlantConfig& plant, const Tran
 }  // namespace
 
 std::vector<ExpectedContact> expectedContacts(const ControllerConfig& controller,
-                                              const plant::PlantConfig& plant) {
-  if (!plant.world) return {};
-  const Environment& environment = plant.world->environment;
+                                              const RobotTask& task) {
+  if (!task.world) return {};
+  const Environment& environment = task.world->environment;
   const Transform X_IP = controller.geometry.fromHome({});
   std::optional<JointVector> held;
-  const std::vector<Nearest> nearest = nearestSurfaces(controller, plant, X_IP, held);
+  const std::vector<Nearest> nearest = nearestSurfaces(controller, task, X_IP, held);
   std::vector<ExpectedContact> out;
   for (std::size_t i = 0; i < nearest.size(); ++i) {
     const Nearest& near = nearest[i];
@@ -175,7 +172,7 @@ std::vector<ExpectedContact> expectedContacts(const ControllerConfig& controller
       one.leaning.inverse_mass =
           inverseMass(*environment.target, environment.target->start.X_IB().R,
                       near.p_I - environment.target->start.p, near.n);
-    const Loop loop = loopOf(controller, plant, one.q, Direction::kSwinging);
+    const Loop loop = loopOf(controller, one.q, Direction::kSwinging);
     const double mass =
         1.0 / (one.leaning.inverse_mass + 1.0 / massAlong(loop, one.leaning.direction));
     one.leaning.stiffness = springLike(environment.law, mass, near.speed);
@@ -184,7 +181,8 @@ std::vector<ExpectedContact> expectedContacts(const ControllerConfig& controller
     out.push_back(one);
   }
   if (held)
-    for (const ExpectedContact& one : gripped(plant, X_IP, *held)) out.push_back(one);
+    for (const ExpectedContact& one : gripped(*task.world, controller.payload, X_IP, *held))
+      out.push_back(one);
   return out;
 }
 
@@ -319,15 +317,15 @@ Loop leaning(Loop loop, const ExpectedContact& contact, double stiffness) {
 }
 
 std::vector<ContactVerdict> assessContacts(const ControllerConfig& controller,
-                                           const plant::PlantConfig& plant, bool limits) {
+                                           const RobotTask& task, bool limits) {
   std::vector<ContactVerdict> out;
-  for (const ExpectedContact& contact : expectedContacts(controller, plant)) {
+  for (const ExpectedContact& contact : expectedContacts(controller, task)) {
     ContactVerdict worst;
     worst.contact = contact;
     worst.limits = {HUGE_VAL, HUGE_VAL};
     double most = -1.0;
     for (const Direction direction : {Direction::kExtending, Direction::kRetracting}) {
-      const Loop loop = loopOf(controller, plant, contact.q, direction);
+      const Loop loop = loopOf(controller, contact.q, direction);
       const Loop as_is = leaning(loop, contact, contact.leaning.stiffness);
       worst.grows = worst.grows || growsLeaning(as_is);
       const DominantRoot root = dominantRoot(as_is);

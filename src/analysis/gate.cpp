@@ -17,20 +17,19 @@ namespace {
 
 constexpr Direction kBoth[] = {Direction::kExtending, Direction::kRetracting};
 
-std::vector<CarriedRobot> bodies(const ControllerConfig& controller,
-                                 const plant::PlantConfig& plant) {
+std::vector<CarriedRobot> bodies(const ControllerConfig& controller, const RobotTask& task) {
   std::vector<CarriedRobot> out;
-  for (const ProgramRobot& one : programRobots(controller, plant)) out.push_back(one.body);
+  for (const ProgramRobot& one : programRobots(controller, task)) out.push_back(one.body);
   return out;
 }
 
 /// The robot of a program as its time goes on.
 class ProgramTime {
  public:
-  ProgramTime(const ControllerConfig& controller, const plant::PlantConfig& plant)
+  ProgramTime(const ControllerConfig& controller, const RobotTask& task)
       : controller_(controller),
-        plant_(plant),
-        robot_(carried(controller.payload), plant.initial_joints),
+        task_(task),
+        robot_(carried(controller.payload), task.initial_joints),
         known_(robot_.model()) {}
 
   /// Everything of a segment, one instant after the other; see(robot) at each.
@@ -38,8 +37,8 @@ class ProgramTime {
   void pass(int segment, const See& see) {
     constexpr int kInstants = 12;     // [-] along each motion
     std::set<std::int64_t> instants;  // [ns]
-    std::vector<plant::RobotEvent> events;
-    for (const plant::RobotEvent& event : plant_.robot_events) {
+    std::vector<RobotEvent> events;
+    for (const RobotEvent& event : task_.robot_events) {
       if (event.cue.segment != segment) continue;
       events.push_back(event);
       const double duration = durationOf(event.action);
@@ -78,7 +77,7 @@ class ProgramTime {
 
  private:
   const ControllerConfig& controller_;
-  const plant::PlantConfig& plant_;
+  const RobotTask& task_;
   MovingRobot robot_;
   RobotModel known_;
   std::int64_t origin_ = 0;  // [ns] start of the segment
@@ -86,10 +85,10 @@ class ProgramTime {
 
 /// True when the `change`d loop decays with every robot and in both directions.
 template <class Change>
-bool holds(const ControllerConfig& controller, const plant::PlantConfig& plant,
+bool holds(const ControllerConfig& controller, const RobotTask& task,
            const std::vector<CarriedRobot>& robots, const Change& change) {
   return std::all_of(std::begin(kBoth), std::end(kBoth), [&](Direction direction) {
-    Loop loop = loopOf(controller, plant, plant.initial_joints, direction);
+    Loop loop = loopOf(controller, task.initial_joints, direction);
     change(loop);
     return decaysWithAll(loop, robots);
   });
@@ -103,7 +102,7 @@ Uncertainty uncertaintyOf(const Compensation& c) {
 
 /// Of the eight corners of what the belief may be off by, one where the loop grows.
 std::optional<std::array<int, 3>> cornerThatGrows(const ControllerConfig& controller,
-                                                  const plant::PlantConfig& plant,
+                                                  const RobotTask& task,
                                                   const std::vector<CarriedRobot>& robots) {
   const Compensation& c = controller.compensation;
   if (!c.inertia) return {};
@@ -115,22 +114,21 @@ std::optional<std::array<int, 3>> cornerThatGrows(const ControllerConfig& contro
   for (const int gain : {1, -1})
     for (const int timing : {1, -1}) {
       const auto change = [&](Loop& l) { l = off(l, by, timing, gain); };
-      if (!holds(controller, plant, both, change))
-        return std::array<int, 3>{timing, gain, holds(controller, plant, heavy, change) ? -1 : 1};
+      if (!holds(controller, task, both, change))
+        return std::array<int, 3>{timing, gain, holds(controller, task, heavy, change) ? -1 : 1};
     }
   return {};
 }
 
 }  // namespace
 
-std::vector<ProgramRobot> programRobots(const ControllerConfig& controller,
-                                        const plant::PlantConfig& plant) {
+std::vector<ProgramRobot> programRobots(const ControllerConfig& controller, const RobotTask& task) {
   const Program& program = controller.program;
   const auto felt = [&](int i) {
     return i < program.size &&
            program.segments[static_cast<std::size_t>(i)].kind == SegmentKind::kAdmittance;
   };
-  ProgramTime time(controller, plant);
+  ProgramTime time(controller, task);
   std::vector<ProgramRobot> out = {time.look()};
   for (int i = 0; i < program.size; ++i) {
     const ProgramRobot begins = time.look();
@@ -142,33 +140,33 @@ std::vector<ProgramRobot> programRobots(const ControllerConfig& controller,
   return out;
 }
 
-bool isStable(const ControllerConfig& controller, const plant::PlantConfig& plant) {
-  const std::vector<CarriedRobot> robots = bodies(controller, plant);
-  return holds(controller, plant, robots, [](Loop&) {}) &&
-         !cornerThatGrows(controller, plant, robots);
+bool isStable(const ControllerConfig& controller, const RobotTask& task) {
+  const std::vector<CarriedRobot> robots = bodies(controller, task);
+  return holds(controller, task, robots, [](Loop&) {}) &&
+         !cornerThatGrows(controller, task, robots);
 }
 
-bool contactsDecay(const ControllerConfig& controller, const plant::PlantConfig& plant) {
+bool contactsDecay(const ControllerConfig& controller, const RobotTask& task) {
   if (controller.passivity.enabled) return true;
-  const std::vector<ExpectedContact> contacts = expectedContacts(controller, plant);
+  const std::vector<ExpectedContact> contacts = expectedContacts(controller, task);
   return std::all_of(contacts.begin(), contacts.end(), [&](const ExpectedContact& contact) {
     return std::all_of(std::begin(kBoth), std::end(kBoth), [&](Direction direction) {
-      return !growsLeaning(leaning(loopOf(controller, plant, contact.q, direction), contact,
-                                   contact.leaning.stiffness));
+      return !growsLeaning(
+          leaning(loopOf(controller, contact.q, direction), contact, contact.leaning.stiffness));
     });
   });
 }
 
-LoopVerdict assessStability(const ControllerConfig& controller, const plant::PlantConfig& plant) {
+LoopVerdict assessStability(const ControllerConfig& controller, const RobotTask& task) {
   LoopVerdict out;
   out.modes = static_cast<int>(controller.admittance.stiffness.size());
   out.stable_modes = out.modes;
-  const std::vector<CarriedRobot> robots = bodies(controller, plant);
-  const auto cured = [&](const auto& change) { return holds(controller, plant, robots, change); };
+  const std::vector<CarriedRobot> robots = bodies(controller, task);
+  const auto cured = [&](const auto& change) { return holds(controller, task, robots, change); };
   out.as_believed = cured([](Loop&) {});
   out.stable = out.as_believed;
   if (out.as_believed)
-    if (const auto corner = cornerThatGrows(controller, plant, robots)) {
+    if (const auto corner = cornerThatGrows(controller, task, robots)) {
       out.stable = false;
       out.off = *corner;
       out.uncertainty = uncertaintyOf(controller.compensation);
@@ -177,7 +175,7 @@ LoopVerdict assessStability(const ControllerConfig& controller, const plant::Pla
   for (const Direction direction : kBoth) {
     double most = 0.0;
     Loop& kept = direction == Direction::kExtending ? out.extending : out.retracting;
-    const Loop loop = loopOf(controller, plant, plant.initial_joints, direction);
+    const Loop loop = loopOf(controller, task.initial_joints, direction);
     for (const CarriedRobot& robot : robots) {
       const Loop with = carrying(loop, robot);
       const double r = radius(with);
@@ -232,10 +230,9 @@ std::string explain(const LoopVerdict& v) {
       v.direction == Direction::kExtending ? "extending" : "retracting", cure);
 }
 
-std::string applyStabilityCheck(ControllerConfig& controller, const plant::PlantConfig& plant) {
+std::string applyStabilityCheck(ControllerConfig& controller, const RobotTask& task) {
   const auto verdict = [&](const ControllerConfig& c) {
-    return isStable(c, plant) && contactsDecay(c, plant) ? Stability::kStable
-                                                         : Stability::kUnstable;
+    return isStable(c, task) && contactsDecay(c, task) ? Stability::kStable : Stability::kUnstable;
   };
   const bool forced = controller.stability == Stability::kForced;
   const Stability as_is = verdict(controller);
@@ -248,9 +245,9 @@ std::string applyStabilityCheck(ControllerConfig& controller, const plant::Plant
   controller.stability = as_is;
   if (forced) controller.stability = controller.stability_uncompensated = Stability::kForced;
   if (as_is == Stability::kStable) return "";
-  if (!isStable(controller, plant)) return explain(assessStability(controller, plant));
+  if (!isStable(controller, task)) return explain(assessStability(controller, task));
   std::string why;
-  for (const ContactVerdict& one : assessContacts(controller, plant))
+  for (const ContactVerdict& one : assessContacts(controller, task))
     if (one.grows) why += (why.empty() ? "" : "; ") + explain(one);
   return why;
 }

@@ -148,13 +148,11 @@ bool decays(const Loop& loop, const Lifted& lifted) {
 
 }  // namespace
 
-RigidBody lockedRobot(const ControllerConfig& controller, const JointVector& q) {
-  return combine(RigidBody{}, controller.payload.X_PL0(),
-                 compositeBody(carried(controller.payload), q));
+RigidBody lockedRobot(const Belief& belief, const JointVector& q) {
+  return combine(RigidBody{}, belief.payload.X_PL0(), compositeBody(carried(belief.payload), q));
 }
 
-Loop loopOf(const ControllerConfig& controller, const plant::PlantConfig& p, const JointVector& q,
-            Direction direction) {
+Loop loopOf(const ControllerConfig& controller, const JointVector& q, Direction direction) {
   Loop loop;
   loop.base = controller.admittance;
   loop.robot_P = lockedRobot(controller, q);
@@ -172,13 +170,12 @@ Loop loopOf(const ControllerConfig& controller, const plant::PlantConfig& p, con
   own.servo.rail = HUGE_VAL;
 
   // The machine as it is believed: what the simulated one truly is, nobody can look up.
-  constexpr double kSpan = 4.0;  // [-] updates that X(k) - X(k-4) goes over
   loop.velocity_gain = model;
-  loop.derivative_gain = model * own.servo.derivative / (kSpan * own.servo.update);
+  loop.derivative_gain = model * own.servo.derivative / (ServoModel::kSpan * own.servo.update);
   loop.tau = own.servo.tau(0);
   loop.sensor_cutoff = own.servo.sensor_cutoff;
-  loop.filter_cutoff = p.filters == plant::LegFilters::kOutputs ? p.filter_cutoff : 0.0;
-  loop.readings = p.sensor_readings;
+  loop.filter_cutoff = own.servo.filter_cutoff;
+  loop.readings = own.servo.sensor_readings;
   return loop;
 }
 
@@ -309,12 +306,11 @@ ModalModel softest(const ModalModel& base, int k) {
   return {base.Phi.leftCols(k), base.stiffness.head(k), base.damping.topLeftCorner(k, k)};
 }
 
-int stableModes(const ControllerConfig& controller, const plant::PlantConfig& plant,
-                const JointVector& q) {
+int stableModes(const ControllerConfig& controller, const JointVector& q) {
   const auto all = static_cast<int>(controller.admittance.stiffness.size());
   for (int k = 1; k <= all; ++k)
     for (const Direction direction : {Direction::kExtending, Direction::kRetracting}) {
-      Loop loop = loopOf(controller, plant, q, direction);
+      Loop loop = loopOf(controller, q, direction);
       loop.base = softest(loop.base, k);
       if (!decays(loop)) return k - 1;
     }

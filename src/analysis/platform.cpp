@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "ves/plant/nominal_servo.hpp"
-
 namespace ves {
 namespace {
 
@@ -105,20 +103,17 @@ double derivedOffset(const Stroke& stroke, double metre_per_count) {
   return std::max(0.0, 0.5 * (stroke.min + stroke.max - range));
 }
 
-SafetyLimits derivedLimits(const WorkspaceUse& use, const plant::LegSlaveGains& gains,
-                           const plant::ActuatorModel& actuator,
-                           const plant::Temposonics& transducer) {
-  const double stroke = actuator.length_max - actuator.length_min;
-  const double slowest =
-      velocityGain(std::min(actuator.gain_extend, actuator.gain_retract), gains, transducer);
+SafetyLimits derivedLimits(const WorkspaceUse& use, const Stroke& legs, const ServoModel& servo) {
+  const double stroke = legs.max - legs.min;
+  const double slowest = std::min(servo.extend.minCoeff(), servo.retract.minCoeff());
   SafetyLimits l;
-  l.leg_min = actuator.length_min + 0.03 * stroke;
-  l.leg_max = actuator.length_max - 0.03 * stroke;
+  l.leg_min = legs.min + 0.03 * stroke;
+  l.leg_max = legs.max - 0.03 * stroke;
   l.joint_cone = std::min(M_PI, use.joint_angle + 5.0 * kDegree);
   l.leg_clearance = 0.8 * use.clearance;
   l.plate_angle = 0.8 * use.plate_angle;
   l.condition = 1.5 * use.condition;
-  l.leg_velocity = 0.95 * slowest * servoRail(gains, transducer);
+  l.leg_velocity = 0.95 * slowest * servo.rail;
   l.position_error = 1.5 * l.leg_velocity / slowest;
   l.position_error_still = 0.015 * stroke;
   l.position_error_lag = 1.35 / slowest;

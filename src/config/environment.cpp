@@ -90,7 +90,7 @@ World readEnvironment(Section s, const Experiment& e) {
   world.link = tool->link;
   world.X_link = tool->X_link;
   const Payload& payload = e.plant.payload;
-  const Transform X_L0T = tool->pose(linkPoses(payload.robot, e.plant.initial_joints));
+  const Transform X_L0T = tool->pose(linkPoses(payload.robot, e.plant.task.initial_joints));
   const Vec3 tool_I = (e.plant.geometry.fromHome({}) * payload.X_PL0() * X_L0T).p;
   Environment& environment = world.environment;
   environment.gravity = e.plant.gravity;
@@ -118,7 +118,7 @@ World readEnvironment(Section s, const Experiment& e) {
     s.fail("bodies", "and target are both missing: there is nothing to touch");
   s.finish();
   JointState joints;
-  joints.q = e.plant.initial_joints;
+  joints.q = e.plant.task.initial_joints;
   BodyMotion P;  // at rest
   P.X = e.plant.geometry.fromHome(e.plant.initial_pose);
   const Touch start =

@@ -54,16 +54,16 @@ void warnOfFullChannels(Experiment& e) {
       most = most.cwiseMax(
           (S_proc * staticWrench(payload, q, attitude, e.plant.gravity).stacked()).cwiseAbs());
   };
-  MovingRobot robot(e.plant.payload.robot, e.plant.initial_joints);
+  MovingRobot robot(e.plant.payload.robot, e.plant.task.initial_joints);
   std::int64_t now = 0;
   look(robot.model(), robot.at(now).q);
-  for (const plant::RobotEvent& event : e.plant.robot_events) {
+  for (const RobotEvent& event : e.plant.task.robot_events) {
     now = endOf(robot, event.action, now);
     look(robot.model(), robot.at(now).q);
   }
   for (int i = 0; i < 6; ++i)
     if (most(i) > kMostShare * kFullScale)
-      e.warnings.push_back(fmt::format(
+      e.source.warnings.push_back(fmt::format(
           "the weight alone takes {:.0f} % of the range of channel {}; a smaller sensor.gain[{}] "
           "would leave room",
           100.0 * most(i) / kFullScale, wrenchComponent(i).name, i));
@@ -111,8 +111,10 @@ Experiment build(const Value& document) {
     // To whole ns, so that each part has a middle.
     p.sensor_readings = sensor.readings;
     p.sensor_window = c.period / (2 * sensor.readings) * 2 * sensor.readings;
+    c.servo.sensor_readings = sensor.readings;
     c.servo.sensor_window = static_cast<double>(p.sensor_window) * kSecondPerNanosecond;
   }
+  if (legs.filters == plant::LegFilters::kOutputs) c.servo.filter_cutoff = legs.filter_cutoff;
   c.servo.jitter = c.compensation.jitter;
   if (root.has("servo")) {
     const ServoRecord record = readServo(root.section("servo"));
@@ -153,9 +155,9 @@ Experiment build(const Value& document) {
     c.payload.adapter_R = robot.adapter_R;
     c.payload.X_RL0 = robot.X_RL0;
     c.payload.robot = out.robot.model;
-    p.initial_joints = robot.q;
-    out.notes = out.robot.warnings;
-    if (!out.robot.choice.empty()) out.warnings.push_back(out.robot.choice);
+    p.task.initial_joints = robot.q;
+    out.source.notes = out.robot.warnings;
+    if (!out.robot.choice.empty()) out.source.warnings.push_back(out.robot.choice);
   }
 
   p.geometry = c.geometry;
@@ -174,7 +176,7 @@ Experiment build(const Value& document) {
   for (const char* key : {"plant_mismatch", "reality"})
     if (root.has(key)) readPlantMismatch(root.section(key), p);
   if (root.has("reality"))
-    out.warnings.push_back("'reality' is called 'plant_mismatch' now; the old name will go");
+    out.source.warnings.push_back("'reality' is called 'plant_mismatch' now; the old name will go");
   const Vec6 L = legLengths(p.geometry, p.geometry.fromHome(p.initial_pose));
   for (int i = 0; i < kLegs; ++i)
     if (!(L(i) >= p.actuator.length_min && L(i) <= p.actuator.length_max))
@@ -182,17 +184,17 @@ Experiment build(const Value& document) {
                 fmt::format("takes leg {} to {:.4f} m, want the stroke of {:.4f} to {:.4f} m",
                             i + 1, L(i), p.actuator.length_min, p.actuator.length_max));
 
-  if (root.has("environment")) p.world = readEnvironment(root.section("environment"), out);
+  if (root.has("environment")) p.task.world = readEnvironment(root.section("environment"), out);
 
-  out.setup = setupOf(document);
+  out.source.calibrated = setupOf(document);
   if (root.has("calibration")) {
     Section section = root.section("calibration");
-    out.calibration = readCalibration(section);
-    if (out.calibration->setup != out.setup)
+    out.source.calibration = readCalibration(section);
+    if (out.source.calibration->setup != out.source.calibrated)
       section.fail("setup", fmt::format("{} is of another sensor, robot or gravity, want {}; "
                                         "calibrate again",
-                                        out.calibration->setup, out.setup));
-    c.bias = out.calibration->bias;
+                                        out.source.calibration->setup, out.source.calibrated));
+    c.bias = out.source.calibration->bias;
   }
 
   if (root.has("masses")) {
@@ -214,15 +216,15 @@ Experiment build(const Value& document) {
       told.loads.begin(), told.loads.begin() + told.size, [](const ToldLoad& a, const ToldLoad& b) {
         return std::pair(a.cue.segment, a.cue.after) < std::pair(b.cue.segment, b.cue.after);
       });
-  if (p.world) {
+  if (p.task.world) {
     const int segment = admittanceSegment(c.program);
-    p.world->release = segment < c.program.size ? segment : -1;
+    p.task.world->release = segment < c.program.size ? segment : -1;
   }
   root.finish();
   warnOfFullChannels(out);
-  out.substitutes = countSubstitutes(document, false);
-  out.resolved = emit(document);
-  out.hash = fingerprint(out.resolved);
+  out.source.substitutes = countSubstitutes(document, false);
+  out.source.resolved = emit(document);
+  out.source.hash = fingerprint(out.source.resolved);
   return out;
 }
 
@@ -242,7 +244,7 @@ Experiment loadExperiment(const std::filesystem::path& file,
 Experiment buildExperiment(Value document, const std::vector<std::string>& overrides) {
   for (const std::string& assignment : overrides) applyOverride(document, assignment);
   Experiment out = build(document);
-  out.document = std::move(document);
+  out.source.document = std::move(document);
   return out;
 }
 
@@ -251,8 +253,8 @@ Experiment parseExperiment(const std::string& resolved, const std::string& name)
 }
 
 std::string applyStabilityCheck(Experiment& e) {
-  const std::string why = applyStabilityCheck(e.controller, e.plant);
-  Value& controller = *e.document.find("controller");
+  const std::string why = applyStabilityCheck(e.controller, e.plant.task);
+  Value& controller = *e.source.document.find("controller");
   const auto put = [&](const char* key, Stability verdict) {
     Value value;
     value.kind = Value::Kind::kScalar;
@@ -261,8 +263,8 @@ std::string applyStabilityCheck(Experiment& e) {
   };
   put("stability", e.controller.stability);
   put("stability_uncompensated", e.controller.stability_uncompensated);
-  e.resolved = emit(e.document);
-  e.hash = fingerprint(e.resolved);
+  e.source.resolved = emit(e.source.document);
+  e.source.hash = fingerprint(e.source.resolved);
   return why;
 }
 
@@ -285,12 +287,12 @@ Interaction interactionOf(const Experiment& experiment, std::int64_t& duration) 
   Interaction out;
   out.base = experiment.controller.admittance;
   out.payload = experiment.plant.payload;
-  out.world = experiment.plant.world;
+  out.world = experiment.plant.task.world;
   out.p_IH = experiment.plant.geometry.home();
-  MovingRobot before(out.payload.robot, experiment.plant.initial_joints);
+  MovingRobot before(out.payload.robot, experiment.plant.task.initial_joints);
   std::int64_t now = 0;
   RobotAction in_hand = Release{};
-  for (const plant::RobotEvent& event : experiment.plant.robot_events) {
+  for (const RobotEvent& event : experiment.plant.task.robot_events) {
     if (event.cue.segment > segment) break;
     if (event.cue.segment == segment) {
       out.actions.push_back({event.cue.after, event.action});

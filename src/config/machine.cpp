@@ -77,8 +77,8 @@ Sensor readSensor(Section s) {
   return out;
 }
 
-MachineConfig readMachine(Section s) {
-  MachineConfig m;
+MachinePieces readMachine(Section s) {
+  MachinePieces m;
   const auto external = [&](const char* key) {
     return s.choice(key, {"simulated", "external"}) == "external" ? Source::kExternal
                                                                   : Source::kSimulated;

@@ -81,7 +81,7 @@ void readController(Section s, ControllerConfig& c);
 void readProgram(Section& root, Experiment& out);
 
 /// machine
-MachineConfig readMachine(Section s);
+MachinePieces readMachine(Section s);
 
 /// plant_mismatch
 void readPlantMismatch(Section s, plant::PlantConfig& p);

@@ -58,7 +58,10 @@ ToolOrder readToolOrder(Section& s) {
 }  // namespace
 
 RobotEvents::RobotEvents(Experiment& out)
-    : robot_(out.robot), out_(out), q_(out.plant.initial_joints), stands_(out.plant.initial_pose) {}
+    : robot_(out.robot),
+      out_(out),
+      q_(out.plant.task.initial_joints),
+      stands_(out.plant.initial_pose) {}
 
 void RobotEvents::pass(const Segment& segment) {
   if (segment.kind == SegmentKind::kMove) stands_ = segment.target;
@@ -98,7 +101,7 @@ void RobotEvents::read(Section& s, const Cue& cue) {
 }
 
 void RobotEvents::moved(const Cue& cue, const RobotAction& action, std::int64_t until) {
-  out_.plant.robot_events.push_back({cue, action});
+  out_.plant.task.robot_events.push_back({cue, action});
   if (const auto* move = std::get_if<RobotMove>(&action)) {
     q_(move->joint) = move->target;
     until_[static_cast<std::size_t>(move->joint)] = until;
@@ -158,7 +161,7 @@ Transform RobotEvents::frameOf(Section& s, const Cue& cue, ToolOrder::Frame fram
            "in: inertial, but admittance control has left the platform anywhere; a move "
            "before it would tell");
   const Vec6 x = stands_->stacked();
-  out_.warnings.push_back(
+  out_.source.warnings.push_back(
       fmt::format("program[{}]: the tool path at {} is planned for a platform that stands where it "
                   "is commanded: [{:.4g}] m, [{:.4g}] rad",
                   cue.segment, secondsOf(cue.after), fmt::join(x.data(), x.data() + 3, ", "),
@@ -190,7 +193,7 @@ void RobotEvents::readGrasp(Section& s, const Cue& cue) {
   holds_ = true;
   Section grasp = s.section("grasp");
   if (grasp.has("target") && grasp.flag("target")) {
-    const std::optional<World>& world = out_.plant.world;
+    const std::optional<World>& world = out_.plant.task.world;
     if (!world || !world->environment.target || !world->environment.grip)
       grasp.fail("target", "there is none, or no grip, in this scenario's environment");
     grasp.finish();

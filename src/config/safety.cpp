@@ -39,7 +39,9 @@ WorkspaceUse readWorkspace(Section s, const Geometry& geometry) {
 
 SafetyLimits readSafety(Section s, const Geometry& geometry, const WorkspaceUse& use,
                         const Legs& legs, double volts_per_count) {
-  const SafetyLimits derived = derivedLimits(use, legs.gains, legs.actuator, legs.transducer);
+  const SafetyLimits derived =
+      derivedLimits(use, {legs.actuator.length_min, legs.actuator.length_max},
+                    plant::nominalServo(legs.gains, legs.actuator, legs.transducer));
   SafetyLimits l;
   l.leg_velocity = s.numberOr("leg_velocity_m_per_s", kTiny, 10.0, derived.leg_velocity);
   l.position_error = s.numberOr("position_error_m", kTiny, 10.0, derived.position_error);

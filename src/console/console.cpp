@@ -31,7 +31,7 @@ class Console {
       : experiment_(experiment),
         options_(options),
         terminal_(options.commands.empty() && isatty(STDIN_FILENO) && isatty(STDOUT_FILENO)),
-        calibration_(experiment.calibration) {
+        calibration_(experiment.source.calibration) {
     for (const std::string& line : options.commands) {
       try {
         script_.push_back(parseCommand(line, experiment));
@@ -125,7 +125,7 @@ class Console {
   void keepCalibration(const state_t& s) {
     CalibrationRecord record;
     record.date = std::time(nullptr);
-    record.setup = experiment_.setup;
+    record.setup = experiment_.source.calibrated;
     record.temperature = temperature_;
     record.bias = Vec6::Map(s.bias);
     record.deviation = Vec6::Map(s.deviation);

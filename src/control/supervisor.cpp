@@ -187,7 +187,8 @@ void Supervisor::advance(const Situation& now, Actuation act) noexcept {
       if (act.motion.over(now.tick)) phase_ = Phase::kStopped;
       break;
     case Phase::kParked:
-    case Phase::kStopped: break;
+    case Phase::kStopped:
+    case Phase::kCount: break;
   }
 }
 

@@ -12,7 +12,7 @@ Machine::Machine(const Experiment& experiment, Bus& bus)
       codec_(experiment.controller.legs),
       leg_tracker_(experiment.machine.follow),
       joint_tracker_(experiment.machine.follow) {
-  const MachineConfig& m = experiment.machine;
+  const MachinePieces& m = experiment.machine;
   if (m.legs == Source::kExternal) real_legs_ = std::make_unique<LegsOnBus>(bus);
   if (m.force_sensor == Source::kExternal) real_sensor_ = std::make_unique<ForceSensorOnBus>(bus);
   if (m.force_sensor == Source::kNetFt)

@@ -34,7 +34,7 @@ std::string scenarioOf(const PosePlan& plan, const Experiment& experiment, const
   quoted += "'";
   const RobotModel& robot = experiment.controller.payload.robot;
   const ControllerConfig& c = experiment.controller;
-  JointVector at = experiment.plant.initial_joints;
+  JointVector at = experiment.plant.task.initial_joints;
   // Fifth-order motions of all joints at once, begun `start` [s] into the segment.
   const auto moves = [&](const JointVector& to, double start, double time) {
     std::string text;

@@ -21,8 +21,7 @@ double velocityGain(double gain, const LegSlaveGains& gains, const Temposonics& 
 }
 
 double derivativeTime(const LegSlaveGains& gains) {
-  constexpr int kSpan = 4;  // [-] updates
-  return kSpan * kUpdate * gains.K_D / gains.K_P;
+  return ServoModel::kSpan * kUpdate * gains.K_D / gains.K_P;
 }
 
 ServoModel nominalServo(const LegSlaveGains& gains, const ActuatorModel& actuator,

@@ -34,13 +34,13 @@ Plant::Plant(const PlantConfig& config)
       position_step_(filter_position_.prepare(seconds(kUpdatePeriod))),
       rate_step_(filter_velocity_.prepare(seconds(kUpdatePeriod))),
       next_step_(kNever),
-      robot_(carried(config.payload), config.initial_joints) {
+      robot_(carried(config.payload), config.task.initial_joints) {
   X_SL0_ = inverse(config.payload.X_PS) * config.payload.X_PL0();
 
   truth_.P.X = config_.geometry.fromHome(config_.initial_pose);
   truth_.legs.L = legLengths(config_.geometry, truth_.P.X);
-  truth_.joints.q = config_.initial_joints;
-  robot_event_done_.assign(config_.robot_events.size(), false);
+  truth_.joints.q = config_.task.initial_joints;
+  robot_event_done_.assign(config_.task.robot_events.size(), false);
   injectors_.resize(config_.faults.size());
   began_.fill(kNever);
   for (int i = 0; i < kLegs; ++i) {
@@ -54,9 +54,10 @@ Plant::Plant(const PlantConfig& config)
   filter_position_.settle(truth_.legs.L.array());
   filter_velocity_.settle(Vec6::Zero().array());
   filter_acceleration_.settle(Vec6::Zero().array());
-  if (config_.world) {
+  if (config_.task.world) {
     tool_ = toolMotion();
-    if (config_.world->environment.target) truth_.target = config_.world->environment.target->start;
+    if (config_.task.world->environment.target)
+      truth_.target = config_.task.world->environment.target->start;
   }
   sensor_.settle(sensorLoad());
   if (config.sensor_readings > 1) {
@@ -91,16 +92,16 @@ void Plant::command(const LegCommand& command) noexcept {
 /// The next event of this segment that is still to come.
 void Plant::planRobotEvent() noexcept {
   next_robot_event_ = kNever;
-  for (std::size_t i = 0; i < config_.robot_events.size(); ++i) {
-    const Cue& cue = config_.robot_events[i].cue;
+  for (std::size_t i = 0; i < config_.task.robot_events.size(); ++i) {
+    const Cue& cue = config_.task.robot_events[i].cue;
     if (cue.segment == segment_ && !robot_event_done_[i])
       next_robot_event_ = std::min(next_robot_event_, segment_start_ + cue.after);
   }
 }
 
 void Plant::startRobotEvents() noexcept {
-  for (std::size_t i = 0; i < config_.robot_events.size(); ++i) {
-    const RobotEvent& event = config_.robot_events[i];
+  for (std::size_t i = 0; i < config_.task.robot_events.size(); ++i) {
+    const RobotEvent& event = config_.task.robot_events[i];
     if (robot_event_done_[i] || event.cue.segment != segment_ ||
         segment_start_ + event.cue.after > now_)
       continue;
@@ -112,8 +113,8 @@ void Plant::startRobotEvents() noexcept {
 
 bool Plant::moveRobot(const RobotAction& action) noexcept {
   if (std::holds_alternative<GraspTarget>(action))
-    return config_.world && !robot_.holds() &&
-           grasp(config_.world->environment, toolMotion(), truth_.target);
+    return config_.task.world && !robot_.holds() &&
+           grasp(config_.task.world->environment, toolMotion(), truth_.target);
   if (std::holds_alternative<Release>(action) && truth_.target.X_TB) {
     truth_.target.X_TB.reset();
     return true;
@@ -128,7 +129,7 @@ double Climate::at(double t) const noexcept {
 
 /// No valve is open, no joint is on its way, and nothing is planned.
 bool Plant::still() const noexcept {
-  if (next_robot_event_ != kNever || config_.world) return false;
+  if (next_robot_event_ != kNever || config_.task.world) return false;
   for (std::size_t i = 0; i < kLegs; ++i)
     if (slaves_[i].code() != 0 || std::abs(actuators_[i].velocity()) > kStillSpeed) return false;
   return !robot_.moving(now_);
@@ -217,13 +218,13 @@ Wrench Plant::sensorLoad() noexcept {
 
 FrameMotion Plant::toolMotion() const noexcept {
   return carriedFrame(robot_.model(), truth_.joints, truth_.P, config_.payload.X_PL0(),
-                      config_.world->link, config_.world->X_link);
+                      config_.task.world->link, config_.task.world->X_link);
 }
 
 /// What touches the tool while it goes from where it was to where it is, as the sensor feels it:
 /// F_So_S. The legs do not feel it, as they feel no other load.
 Wrench Plant::meetWorld(double dt) noexcept {
-  const World& world = *config_.world;
+  const World& world = *config_.task.world;
   const FrameMotion now = toolMotion();
   const bool held = world.release >= 0 && began_[static_cast<std::size_t>(world.release)] == kNever;
   Floating target = truth_.target;
@@ -289,7 +290,7 @@ void Plant::stepMechanics() noexcept {
   truth_.joints = real_joints_ ? *real_joints_ : robot_.at(now_);
 
   Wrench F_So_S = sensorLoad();
-  if (config_.world) F_So_S = F_So_S + meetWorld(dt);
+  if (config_.task.world) F_So_S = F_So_S + meetWorld(dt);
   // Behind Filter 3 the acceleration is smooth again, and known at the end of the step.
   const auto over = config_.filters == LegFilters::kNone ? ForceTorqueSensor::Over::kConstant
                                                          : ForceTorqueSensor::Over::kRamp;

@@ -65,7 +65,7 @@ std::vector<ContactPair> contactPairs(const Series& series, const std::optional<
 
 void addContacts(const Series& series, const std::optional<Emulation>& e,
                  nlohmann::ordered_json& out) {
-  if (!series.experiment.plant.world) return;
+  if (!series.experiment.plant.task.world) return;
   const std::vector<ContactPair> pairs = contactPairs(series, e);
   int emulated = 0, free_space = 0;
   double peak = 0.0, due = 0.0;

@@ -72,7 +72,7 @@ std::vector<KeyDifference> differences(const std::vector<Leaves>& runs) {
 
 std::vector<KeyDifference> configurationDifferences(const std::vector<const Experiment*>& runs) {
   std::vector<Leaves> all;
-  for (const Experiment* run : runs) collect(run->document, "", all.emplace_back());
+  for (const Experiment* run : runs) collect(run->source.document, "", all.emplace_back());
   return differences(all);
 }
 

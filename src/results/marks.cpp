@@ -42,8 +42,8 @@ std::vector<Mark> segmentMarks(const Series& series) {
 
 std::vector<Mark> robotMarks(const Experiment& experiment, int segment) {
   std::vector<Mark> out;
-  double rests = -HUGE_VAL;                                               // from then on
-  for (const plant::RobotEvent& event : experiment.plant.robot_events) {  // by time
+  double rests = -HUGE_VAL;                                             // from then on
+  for (const RobotEvent& event : experiment.plant.task.robot_events) {  // by time
     if (event.cue.segment != segment) continue;
     const double start = static_cast<double>(event.cue.after) * kSecondPerNanosecond;
     if (rests < start && std::isfinite(rests)) out.push_back({rests, "at rest"});

@@ -291,7 +291,7 @@ std::vector<std::filesystem::path> drawPlots(const Series& series,
     finish("tool.png", page);
   }
 
-  if (experiment.plant.world) {
+  if (experiment.plant.task.world) {
     Page page(series, marks, "contact.png",
               experiment.name + ": what the tool touches, and the energy that the emulation put in",
               program, 1, 2);

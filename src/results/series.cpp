@@ -279,7 +279,7 @@ std::vector<Column> columns(const Experiment& experiment) {
           },
           "where the tool truly is, in inertial axes");
   }
-  if (experiment.plant.world) {
+  if (experiment.plant.task.world) {
     truth(
         "clearance_m", [](const truth_t& m) { return m.clearance; },
         "of the tool from the nearest surface, least of the last step");
@@ -290,7 +290,7 @@ std::vector<Column> columns(const Experiment& experiment) {
           "on the tool from what it touches, mean over the last step");
     truth(
         "contacts", [](const truth_t& m) { return static_cast<double>(m.contacts); }, "so far");
-    if (experiment.plant.world->environment.target)
+    if (experiment.plant.task.world->environment.target)
       for (int i = 0; i < 3; ++i) {
         truth(
             fmt::format("{}_target_m", coordinate(i).name),

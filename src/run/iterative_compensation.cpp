@@ -32,11 +32,11 @@ class Passes {
   /// mean of as many ticks. False when a check stopped it.
   bool feel(const RecordedPath& path, int slower, Wrenches& felt) {
     Experiment e = experiment_;
-    e.plant.initial_joints = q0_;
-    e.plant.robot_events.clear();
+    e.plant.task.initial_joints = q0_;
+    e.plant.task.robot_events.clear();
     constexpr int kMove = 0, kSettle = 1, kPath = 2;
     for (const TimedAction& one : actions_)
-      e.plant.robot_events.push_back(
+      e.plant.task.robot_events.push_back(
           {{kPath, one.start * slower}, ves::slower(one.action, slower)});
     Program& program = e.controller.program;
     program = {};

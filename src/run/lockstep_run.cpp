@@ -17,9 +17,9 @@ experiment_t describe(const Experiment& experiment, const Identity& from, std::i
   m.header = header(from, 0, time);
   m.schema = kSchema;
   m.name = experiment.name;
-  m.hash = experiment.hash;
+  m.hash = experiment.source.hash;
   m.version = describeBuild();
-  m.resolved = experiment.resolved;
+  m.resolved = experiment.source.resolved;
   return m;
 }
 

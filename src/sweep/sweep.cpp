@@ -206,9 +206,10 @@ class Workers {
 void requireSame(const SweepPlan& plan, const SweepOptions& options) {
   std::vector<std::string> all = options.overrides;
   for (const std::string& one : plan.overrides(0)) all.push_back(one);
-  const std::string text = plan.text() + fmt::format("set {}\nconfiguration of run 0: {}\n",
-                                                     fmt::join(options.overrides, " "),
-                                                     loadExperiment(options.scenario, all).hash);
+  const std::string text =
+      plan.text() + fmt::format("set {}\nconfiguration of run 0: {}\n",
+                                fmt::join(options.overrides, " "),
+                                loadExperiment(options.scenario, all).source.hash);
   const fs::path file = options.file.string() + ".plan";
   if (std::ifstream in(file, std::ios::binary); in) {
     const std::string there((std::istreambuf_iterator<char>(in)), {});

@@ -32,7 +32,7 @@ void massesSection(Reproduction& r) {
     const Experiment e = loadExperiment(base);
     const StaticSetup setup = staticSetup(e.controller);
     const SeparableCombinations c = separableCombinations(setup.robot);
-    const PosePlan plan = planPoses(setup, c, e.controller, e.plant.initial_joints, {});
+    const PosePlan plan = planPoses(setup, c, e.controller, e.plant.task.initial_joints, {});
     const fs::path file = piece.scratch / ("identify_" + robot + ".yaml");
     constexpr double kSpeed = 30.0;  // [deg/s]
     std::ofstream(file) << scenarioOf(plan, e, "identify_" + robot, base.string(), kSpeed);

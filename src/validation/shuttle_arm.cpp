@@ -73,7 +73,7 @@ Motion onTheArmAlone(Reproduction& r, const std::string& configuration, const st
                      EightRuns& all) {
   const std::string scenario = "srms_" + configuration + "_" + robot;
   const Experiment e = r.load(scenario);
-  r.substitutes = std::max(r.substitutes, e.substitutes);
+  r.substitutes = std::max(r.substitutes, e.source.substitutes);
   const std::string more = fmt::format("base.keep_modes={}", kManyModes);
   const Motion srms = simulated(e, InteractionModel::kSplit);
   const Distance travelled = travel(srms),
@@ -234,13 +234,13 @@ void divergence(Reproduction& r) {
                          "controller.stability=forced"};
   const Experiment e = r.load(scenario, set);
   const DominantRoot s =
-      dominantRoot(loopOf(e.controller, e.plant, e.plant.initial_joints, Direction::kExtending));
+      dominantRoot(loopOf(e.controller, e.plant.task.initial_joints, Direction::kExtending));
   const Reproduction::Run run = r.run(scenario, set);
   const RunResult& result = run.result;
   r.numbers["divergence"] = {
       {"scenario", scenario},
       {"modes_kept", 6},
-      {"stable_modes", stableModes(e.controller, e.plant, e.plant.initial_joints)},
+      {"stable_modes", stableModes(e.controller, e.plant.task.initial_joints)},
       {"growth_per_s", s.growth},
       {"frequency_hz", s.frequency},
       {"stopped_by", name(result.cause)},

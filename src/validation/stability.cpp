@@ -80,12 +80,12 @@ void massRatiosOfTheRuns(Reproduction& r) {
       const std::string scenario = "srms_" + configuration + "_" + robot;
       const Experiment e = r.load(scenario), six = r.load(scenario, {"base.keep_modes=6"});
       const Experiment filtered = r.load(scenario, {"base.keep_modes=6", "legs.filters=outputs"});
-      const JointVector& q = e.plant.initial_joints;
-      const Loop loop = loopOf(six.controller, six.plant, q, Direction::kExtending);
+      const JointVector& q = e.plant.task.initial_joints;
+      const Loop loop = loopOf(six.controller, q, Direction::kExtending);
       const double ratio = massRatios(e.controller.admittance, loop.robot_P)(0);
       const double ratio_six = massRatios(loop.base, loop.robot_P)(0);
-      const int none = stableModes(six.controller, six.plant, q);
-      const int outputs = stableModes(filtered.controller, filtered.plant, q);
+      const int none = stableModes(six.controller, q);
+      const int outputs = stableModes(filtered.controller, q);
       kept_below += ratio <= 1.0;
       six_below += ratio_six <= 1.0;
       ++of;

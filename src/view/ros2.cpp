@@ -96,8 +96,8 @@ class McapExport::Impl {
   }
 
   void finish() {
-    out_.attach(experiment_.name + ".yaml", "application/yaml", experiment_.resolved);
-    out_.describe("ves", {{"configuration_hash", experiment_.hash},
+    out_.attach(experiment_.name + ".yaml", "application/yaml", experiment_.source.resolved);
+    out_.describe("ves", {{"configuration_hash", experiment_.source.hash},
                           {"version", version_},
                           {"scenario", experiment_.name}});
     out_.finish();
@@ -226,9 +226,9 @@ class McapExport::Impl {
   void begin(std::int64_t now) {
     std::vector<Stamped> fixed;
     for (const char* prefix : {"", "ghost/"})
-      robotFrames(experiment_.plant.initial_joints, false, prefix, fixed);
+      robotFrames(experiment_.plant.task.initial_joints, false, prefix, fixed);
     transforms(tf_static_, now, fixed);
-    const Value* robot = experiment_.document.find("robot");
+    const Value* robot = experiment_.source.document.find("robot");
     if (const Value* urdf = robot ? robot->find("urdf_text") : nullptr)
       out_.write(description_, now, Cdr().text(urdf->text).bytes());
   }

@@ -113,7 +113,7 @@ Scene::Scene(const Experiment& e)
                     {"radius", 0.08 * carriedSize()},
                     {"length", payload_.X_PS.p.z()}});
   if (!e.robot.frames.empty()) addRobot(e.robot);
-  if (e.plant.world) addWorld(e.plant.world->environment);
+  if (e.plant.task.world) addWorld(e.plant.task.world->environment);
   addArm();
 
   const auto addPose = [&](const char* what, const double(state_t::*field)[6]) {

@@ -168,7 +168,7 @@ Drawing drawn(const Scene& scene, const std::vector<float>& picture, StillView v
 std::string stillAtStart(const Experiment& experiment, StillView view) {
   Row row;
   Vec6::Map(row.state.x_measured).setZero();
-  JointVector::Map(row.sample.q) = experiment.plant.initial_joints;
+  JointVector::Map(row.sample.q) = experiment.plant.task.initial_joints;
   row.has_sample = true;
   const Scene scene(experiment);
   return svg({drawn(scene, scene.picture(row, {}), view)}, 0.0);

@@ -144,7 +144,7 @@ void GravityCompensationPuma(benchmark::State& state) {
     benchmark::DoNotOptimize(R);
     benchmark::DoNotOptimize(gravityCompensation(
         e.controller.payload, R,
-        staticWrench(e.controller.payload, e.plant.initial_joints, R, e.controller.gravity)));
+        staticWrench(e.controller.payload, e.plant.task.initial_joints, R, e.controller.gravity)));
   }
 }
 BENCHMARK(GravityCompensationPuma);
@@ -278,7 +278,7 @@ void LegSlavePeriod(benchmark::State& state) {  // 1023 us of one leg
   std::int32_t count = 8000;
   for (auto _ : state) {
     benchmark::DoNotOptimize(count);
-    for (int i = 0; i < plant::kReadingsPerUpdate; ++i) leg.read(count, 8010);
+    for (int i = 0; i < kReadingsPerUpdate; ++i) leg.read(count, 8010);
     benchmark::DoNotOptimize(leg.code());
   }
 }

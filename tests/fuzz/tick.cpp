@@ -52,7 +52,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   TestPlatform platform(e.controller);
   TickInput input;
   Sample& s = input.sample;
-  s.q = e.plant.initial_joints;
+  s.q = e.plant.task.initial_joints;
   s.switches = kAllSwitchesClosed;
   s.adc[6] = (limits.pressure_min + limits.pressure_max) / 2;
   s.sequence = 0;
@@ -111,7 +111,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       case 11: input.order.request = static_cast<Request>(what / 16 % 8); break;
       case 12:
         s.switches = kAllSwitchesClosed;
-        s.q = e.plant.initial_joints;
+        s.q = e.plant.task.initial_joints;
         s.adc[6] = (limits.pressure_min + limits.pressure_max) / 2;
         break;
       case 13: s.wrench_time += 1000 * in.take<std::int16_t>(); break;

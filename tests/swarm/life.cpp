@@ -141,7 +141,7 @@ std::string drawRobot(Dice& dice, const Experiment& e) {
   const int joint = dice.whole(0, static_cast<int>(names.size()) - 1);
   const Link& link = e.controller.payload.robot.jointLink(joint);
   const double unit = link.type == JointType::kRevolute ? kDegree : 1e-3;
-  const double q = e.plant.initial_joints(joint) + 0.3 * dice.between(-1.0, 1.0);
+  const double q = e.plant.task.initial_joints(joint) + 0.3 * dice.between(-1.0, 1.0);
   return fmt::format("robot {} {:.2f} {:.1f}", names[static_cast<std::size_t>(joint)],
                      std::clamp(q, link.lower + 0.01, link.upper - 0.01) / unit,
                      dice.between(0.5, 3.0));

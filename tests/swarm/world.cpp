@@ -165,7 +165,7 @@ class World {
   void restartMachine() {
     plant::PlantConfig config = e_.plant;
     config.initial_pose = pose_;
-    config.initial_joints = joints_;
+    config.task.initial_joints = joints_;
     config.seed += static_cast<std::uint32_t>(machines_);
     beginMachine(config, tick_);
   }

@@ -65,8 +65,8 @@ struct Meeting {
 /// As fast as leaves neither the workspace nor the sensor's range.
 Meeting meeting(double mass, double stiffness, const Sets& more) {
   const auto loopOfIt = [](const Experiment& e) {
-    const ExpectedContact contact = expectedContacts(e.controller, e.plant).at(0);
-    return leaning(loopOf(e.controller, e.plant, contact.q, Direction::kSwinging), contact,
+    const ExpectedContact contact = expectedContacts(e.controller, e.plant.task).at(0);
+    return leaning(loopOf(e.controller, contact.q, Direction::kSwinging), contact,
                    contact.leaning.stiffness);
   };
   const double meets = meetingMass(loopOfIt(meetingAt(0.01, 2.0, mass, stiffness, more))),
@@ -89,12 +89,12 @@ struct Books {
 
   explicit Books(const Experiment& experiment)
       : e(experiment),
-        M_1(spatialMass(lockedRobot(e.controller, e.plant.initial_joints))),
+        M_1(spatialMass(lockedRobot(e.controller, e.plant.task.initial_joints))),
         inverse(leastSquares(e.controller.admittance.Phi, Mat6::Identity())) {}
   double operator()(const Vec6& x, const Vec6& x_dot, const Floating& target) const {
     const ModalModel& base = e.controller.admittance;
     const Eigen::VectorXd eta = inverse * x, eta_dot = inverse * x_dot;
-    const Target& body = *e.plant.world->environment.target;
+    const Target& body = *e.plant.task.world->environment.target;
     const Mat3 I = target.X_IB().R * body.I_Bcm_B * target.X_IB().R.transpose();
     return 0.5 * (eta_dot.squaredNorm() + eta.dot(base.stiffness.cwiseProduct(eta)) +
                   x_dot.dot(M_1 * x_dot) + body.mass * target.v.squaredNorm() +
@@ -331,9 +331,9 @@ int map(const Sets& more) {
   forEach(kSide * kSide, [&](int i) {
     all[static_cast<std::size_t>(i)] = measure(massOf(i), stiffnessOf(i), more);
   });
-  fmt::print("{:>8} {:>9} {:>8} {:>10} {:>10} {:>10} {:>10} {:>10} {:>9} {:>9} {:>9} {:>9} {:>9}\n", "kg",
-             "N/m", "ended", "error", "in ball", "foretold", "account", "growth/s", "e", "e free", "peak N",
-             "free N", "damped");
+  fmt::print("{:>8} {:>9} {:>8} {:>10} {:>10} {:>10} {:>10} {:>10} {:>9} {:>9} {:>9} {:>9} {:>9}\n",
+             "kg", "N/m", "ended", "error", "in ball", "foretold", "account", "growth/s", "e",
+             "e free", "peak N", "free N", "damped");
   // Whole counts of legs and sensor hide what is less: both run with the noise off.
   constexpr double kSeen = 0.02;  // [-]
   int looked = 0, wrong = 0;

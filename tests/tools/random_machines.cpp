@@ -20,9 +20,9 @@
 
 #include "machines.hpp"
 #include "support/rig.hpp"
-#include "ves/run/truth.hpp"
 #include "ves/analysis/gate.hpp"
 #include "ves/results/comparison.hpp"
+#include "ves/run/truth.hpp"
 
 namespace ves {
 namespace {
@@ -203,7 +203,7 @@ int gates(int n, unsigned seed, const Sets& set) {
                     amplitude, 0.75 * amplitude)};
     const Sets all_of = with(with(kCompensated, base), set);
     Experiment asked = test::unassessed("puma_on_table_4_1", all_of);
-    one.admitted = isStable(asked.controller, asked.plant);
+    one.admitted = isStable(asked.controller, asked.plant.task);
 
     const Compensation& by = asked.controller.compensation;
     const auto wrong = [&](double most) { return 1.0 + dice.between(-most, most); };

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "ves/analysis/loop.hpp"
+#include "ves/planning/robot_task.hpp"
 
 namespace ves {
 
@@ -22,7 +23,7 @@ struct ExpectedContact {
 /// Those that the tool, or the target on its way, comes near to in admittance control, and what the
 /// grip holds. Empty without an environment.
 std::vector<ExpectedContact> expectedContacts(const ControllerConfig& controller,
-                                              const plant::PlantConfig& plant);
+                                              const RobotTask& task);
 
 /// The loop of an expected contact, its spring and damper scaled to another stiffness.
 Loop leaning(Loop loop, const ExpectedContact& contact, double stiffness);
@@ -66,7 +67,7 @@ bool growsLeaning(const Loop& loop);
 
 /// Of every contact, the servos' gain at its worst. The limits take a second each.
 std::vector<ContactVerdict> assessContacts(const ControllerConfig& controller,
-                                           const plant::PlantConfig& plant, bool limits = true);
+                                           const RobotTask& task, bool limits = true);
 
 /// In one line.
 std::string explain(const ContactVerdict& verdict);

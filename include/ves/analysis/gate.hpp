@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "ves/analysis/loop.hpp"
+#include "ves/planning/robot_task.hpp"
 
 namespace ves {
 
@@ -40,21 +41,20 @@ struct ProgramRobot {
 /// begins, all along each motion of its admittance segments, and with each load in hand before and
 /// after the controller is told. What is ordered by hand is not known beforehand; the oscillation
 /// monitor looks at that.
-std::vector<ProgramRobot> programRobots(const ControllerConfig& controller,
-                                        const plant::PlantConfig& plant);
+std::vector<ProgramRobot> programRobots(const ControllerConfig& controller, const RobotTask& task);
 
 /// Whether the loop decays at its worst. Much less work than the rest of the verdict.
-bool isStable(const ControllerConfig& controller, const plant::PlantConfig& plant);
+bool isStable(const ControllerConfig& controller, const RobotTask& task);
 /// Whether the tool may lean on all that it is expected to touch (analysis/contact.hpp), or what
 /// that gives is taken back by the passivity controller.
-bool contactsDecay(const ControllerConfig& controller, const plant::PlantConfig& plant);
-LoopVerdict assessStability(const ControllerConfig& controller, const plant::PlantConfig& plant);
+bool contactsDecay(const ControllerConfig& controller, const RobotTask& task);
+LoopVerdict assessStability(const ControllerConfig& controller, const RobotTask& task);
 
 /// In one line: what grows, how fast, and what would cure it.
 std::string explain(const LoopVerdict& verdict);
 
 /// Sets ControllerConfig::stability and stability_uncompensated; what is forced stays so. Returns
 /// the explanation where the loop would diverge; empty when all is well.
-std::string applyStabilityCheck(ControllerConfig& controller, const plant::PlantConfig& plant);
+std::string applyStabilityCheck(ControllerConfig& controller, const RobotTask& task);
 
 }  // namespace ves

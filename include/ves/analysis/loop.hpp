@@ -23,7 +23,6 @@
 #include <vector>
 
 #include "ves/control/test_platform.hpp"
-#include "ves/plant/plant.hpp"
 
 namespace ves {
 
@@ -80,13 +79,11 @@ Loop off(Loop loop, const Uncertainty& by, int timing, int gain);
 enum class Direction { kExtending, kRetracting, kSwinging };
 
 /// The robot as the controller believes it, its joints locked at q.
-RigidBody lockedRobot(const ControllerConfig& controller, const JointVector& q);
+RigidBody lockedRobot(const Belief& belief, const JointVector& q);
 
-/// The loop of an experiment as its controller believes the machine: servos and sensor by its servo
-/// model, the robot by its payload, the joints at q. Of `plant` it takes what both are told: the
-/// program's robot, how many readings make a mean, whether Filters 1 to 3 are there.
-Loop loopOf(const ControllerConfig& controller, const plant::PlantConfig& plant,
-            const JointVector& q, Direction direction);
+/// The loop as the controller believes it: servos and sensor by its servo model, the robot by its
+/// payload, the joints at q.
+Loop loopOf(const ControllerConfig& controller, const JointVector& q, Direction direction);
 
 /// A robot in P with its joints locked, and what the controller takes it for.
 struct CarriedRobot {
@@ -136,8 +133,7 @@ Margins margins(const Loop& loop);
 
 /// How many of the base's modes can be kept: the largest k for which the loop with 1, 2, .. k modes
 /// decays with the gain of either direction, the robot at q. 0 when even one diverges.
-int stableModes(const ControllerConfig& controller, const plant::PlantConfig& plant,
-                const JointVector& q);
+int stableModes(const ControllerConfig& controller, const JointVector& q);
 
 /// The loop without its contact, under a force along contact->direction whose reading [N] a tick
 /// takes: what an impact is integrated with, period by period.

@@ -5,9 +5,8 @@
 #pragma once
 
 #include "ves/control/safety_checks.hpp"
+#include "ves/control/servo.hpp"
 #include "ves/kinematics/stewart.hpp"
-#include "ves/plant/actuator.hpp"
-#include "ves/plant/leg_slave.hpp"
 
 namespace ves {
 
@@ -52,9 +51,7 @@ double derivedOffset(const Stroke& stroke, double metre_per_count);
 
 /// Limits of the safety checks that follow from the geometry and the servos: translation and
 /// rotation as given; lengths, joints, clearances, condition, speed and errors derived; the rest 0.
-SafetyLimits derivedLimits(const WorkspaceUse& use, const plant::LegSlaveGains& gains,
-                           const plant::ActuatorModel& actuator,
-                           const plant::Temposonics& transducer);
+SafetyLimits derivedLimits(const WorkspaceUse& use, const Stroke& stroke, const ServoModel& servo);
 
 /// How far one coordinate goes alone from home, and the check that ends it there.
 struct Travel {

@@ -33,7 +33,9 @@ struct NetFtAddress {
   int http_port = 0;  // [-] of its configuration
 };
 
-struct MachineConfig {
+/// Which pieces of the machine are real, and how they are reached. The simulated ones are the
+/// plant's.
+struct MachinePieces {
   Source legs = Source::kSimulated;
   Source force_sensor = Source::kSimulated;
   Source robot = Source::kSimulated;
@@ -49,25 +51,30 @@ struct MachineConfig {
   }
 };
 
-/// One experiment, complete: what the controller believes, what the plant is, and the text both
-/// came from.
-struct Experiment {
-  std::string name;
-  std::string description;
-  ControllerConfig controller;
-  plant::PlantConfig plant;
-  MachineConfig machine;
-  std::string key_file;         // of the bus; empty: none
-  UrdfRobot robot;              // as configured; without frames: none
-  std::optional<ArmShape> arm;  // that the base is the tip of
-  std::vector<std::string> warnings;
-  std::vector<std::string> notes;                // known oddities of a robot's file
-  std::optional<CalibrationRecord> calibration;  // that the bias comes from
-  std::string setup;     // hash of what a calibration depends on: sensor, robot, gravity
-  int substitutes = 0;   // [-] numbers that stand in for unknown ones
+/// Where the numbers of an experiment came from.
+struct Provenance {
   Value document;        // what it was built from, URDF inside
   std::string resolved;  // the same as YAML; parseExperiment() reads it back
   std::string hash;      // of `resolved`
+  int substitutes = 0;   // [-] numbers that stand in for unknown ones
+  std::optional<CalibrationRecord> calibration;  // that the bias comes from
+  std::string calibrated;  // hash of what a calibration depends on: sensor, robot, gravity
+  std::vector<std::string> warnings;
+  std::vector<std::string> notes;  // known oddities of a robot's file
+};
+
+/// One experiment, complete. What judges or decides for the controller takes the controller's part
+/// and the task, and cannot see the rest.
+struct Experiment {
+  std::string name;
+  std::string description;
+  ControllerConfig controller;  // what it believes, and what is asked of it
+  plant::PlantConfig plant;     // what the simulated machine is; `task`: what is asked of the robot
+  MachinePieces machine;        // which pieces are real
+  std::string key_file;         // of the bus; empty: none
+  UrdfRobot robot;              // as configured, with its looks; without frames: none
+  std::optional<ArmShape> arm;  // that the vehicle is the tip of
+  Provenance source;
 };
 
 /// Reads a scenario file; `overrides` are "key.path=value"; `calibration`, `masses` and `servo` are

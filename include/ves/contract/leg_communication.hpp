@@ -9,6 +9,11 @@
 
 namespace ves {
 
+// The LegSlaves' times (report, 2.4).
+inline constexpr std::int64_t kTransducerPeriod = 341'000;                             // [ns]
+inline constexpr int kReadingsPerUpdate = 3;                                           // [-]
+inline constexpr std::int64_t kUpdatePeriod = kReadingsPerUpdate * kTransducerPeriod;  // [ns]
+
 struct LegCodec {
   Vec6 offset = Vec6::Zero();  // [m] length at zero counts
   Vec6 scale = Vec6::Ones();   // [m/count]

@@ -46,6 +46,12 @@ struct Segment {
 
 inline constexpr int kMaxSegments = 64;
 
+/// When something happens: `after` the controller's program reached `segment`.
+struct Cue {
+  int segment = 0;         // [-] -1: since the machine began
+  std::int64_t after = 0;  // [ns]
+};
+
 enum class Request : std::int32_t {
   kNone,
   kStart,         // take the legs, run the program, come home

@@ -78,17 +78,24 @@ struct ToldLoads {
   std::array<ToldLoad, kMaxToldLoads> loads{};  // by segment and time
 };
 
-struct ControllerConfig {
-  std::int64_t period = 10'000'000;  // [ns]
+/// What the controller takes the machine, its load and the vehicle for: from data sheets,
+/// identifications and guesses. What judges or decides for it (stability, limits, plans) knows this
+/// and nothing more; what the machine truly is, plant::PlantConfig says.
+struct Belief {
   Geometry geometry;
   ForceSensor sensor;
   Vec6 bias = Vec6::Zero();          // [count] until a calibration replaces it
-  Payload payload;                   // the controller's model of it,
-  ToldLoads told_loads;              // and of what the robot takes in hand
+  Payload payload;                   // what the sensor carries,
+  ToldLoads told_loads;              // and what the robot takes in hand
   Vec3 gravity = {0.0, 0.0, -9.81};  // [m/s^2] g_I
-  ModalModel admittance;
+  ModalModel admittance;             // the vehicle
   LegCodec legs;
-  ServoModel servo;  // the controller's model of the servos
+  ServoModel servo;
+};
+
+/// A belief, and what is asked of the controller that holds it.
+struct ControllerConfig : Belief {
+  std::int64_t period = 10'000'000;  // [ns]
   Compensation compensation;
   Passivity passivity;
   SafetyLimits safety;

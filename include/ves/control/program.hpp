@@ -16,12 +16,6 @@ struct Program {
   std::array<Segment, kMaxSegments> segments{};
 };
 
-/// When something happens: `after` the controller's program reached `segment`.
-struct Cue {
-  int segment = 0;         // [-] -1: since the machine began
-  std::int64_t after = 0;  // [ns]
-};
-
 /// The first of its segments that is admittance control; its size when none is.
 int admittanceSegment(const Program& program) noexcept;
 

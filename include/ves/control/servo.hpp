@@ -18,6 +18,8 @@
 namespace ves {
 
 struct ServoModel {
+  static constexpr int kSpan = 4;  // [-] updates that the derivative gain looks back
+
   Vec6 extend = Vec6::Zero();   // [1/s] velocity gain K for E > 0
   Vec6 retract = Vec6::Zero();  // [1/s] and for E < 0
   Vec6 tau = Vec6::Zero();      // [s]
@@ -28,6 +30,8 @@ struct ServoModel {
   double rail = 0.0;            // [m] E at the D/A converter's full scale
   double sensor_cutoff = 0.0;   // [rad/s] of the filter that the wrench passes
   double sensor_window = 0.0;   // [s] over which its readings are averaged; 0: one reading
+  int sensor_readings = 1;      // [-] that it is the mean of
+  double filter_cutoff = 0.0;   // [rad/s] of the filter that the accelerations pass; 0: none
   double sensor_delay = 0.0;    // [s] by which it is later than all of that says
   double sensor_scale = 1.0;    // [-] of the robot's modelled inertia that it shows
   LegCodec readings;            // of the transducers

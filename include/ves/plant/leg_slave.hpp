@@ -6,11 +6,9 @@
 #include <array>
 #include <cstdint>
 
-namespace ves::plant {
+#include "ves/contract/leg_communication.hpp"
 
-inline constexpr std::int64_t kTransducerPeriod = 341'000;                             // [ns]
-inline constexpr int kReadingsPerUpdate = 3;                                           // [-]
-inline constexpr std::int64_t kUpdatePeriod = kReadingsPerUpdate * kTransducerPeriod;  // [ns]
+namespace ves::plant {
 
 struct LegSlaveGains {
   int K_P = 8500;  // [1/256 D/A digit per count] proportional; the Nomenclature swaps the two

@@ -19,7 +19,7 @@ class OneLeg {
 
   double length() const noexcept { return actuator_.length(); }  // [m]
   static constexpr double kStep =                                // [s]
-      static_cast<double>(plant::kTransducerPeriod) * kSecondPerNanosecond;
+      static_cast<double>(kTransducerPeriod) * kSecondPerNanosecond;
 
  private:
   plant::Temposonics transducer_;

@@ -21,7 +21,7 @@
 #include "ves/contract/leg_watchdog.hpp"
 #include "ves/contract/sample.hpp"
 #include "ves/control/program.hpp"
-#include "ves/planning/moving_robot.hpp"
+#include "ves/planning/robot_task.hpp"
 #include "ves/plant/actuator.hpp"
 #include "ves/plant/faults.hpp"
 #include "ves/plant/force_torque_sensor.hpp"
@@ -35,11 +35,6 @@ namespace ves::plant {
 enum class LegFilters {
   kNone,
   kOutputs  // one each on the position, velocity and acceleration that forward kinematics reads
-};
-
-struct RobotEvent {
-  Cue cue;
-  RobotAction action;
 };
 
 /// Between two looks at what touches; half of it changes no figure of a contact by 1 %.
@@ -68,10 +63,8 @@ struct PlantConfig {
   Climate climate;
   Payload payload;                   // as it is
   Vec3 gravity = {0.0, 0.0, -9.81};  // [m/s^2] g_I
-  JointVector initial_joints = JointVector::Zero();
-  std::vector<RobotEvent> robot_events;
+  RobotTask task;
   std::vector<FaultEvent> faults;
-  std::optional<World> world;
   Watchdog watchdog;
   std::uint32_t seed = 1;
 };
