@@ -41,6 +41,11 @@ int showLoop(const Experiment& e) {
     fmt::print("{}\n", explain(v));
     return kTripped;
   }
+  if (std::isfinite(v.stable_for))
+    fmt::print(
+        "grows, slowly: {:.4g} times as much after {:.4g} s, which is let pass up to {:.4g} "
+        "(controller.most_growth); a longer segment is refused\n",
+        std::exp(std::max(0.0, v.worst.growth) * v.longest), v.longest, e.controller.most_growth);
   for (const Direction direction : {Direction::kExtending, Direction::kRetracting}) {
     const bool extending = direction == Direction::kExtending;
     const Margins m = margins(extending ? v.extending : v.retracting);

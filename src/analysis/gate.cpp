@@ -85,10 +85,11 @@ class ProgramTime {
 
 /// True when the `change`d loop decays with every robot and in both directions.
 template <class Change>
-bool holds(const ControllerConfig& controller, const RobotTask& task,
+bool holds(const ControllerConfig& controller, const RobotTask& task, double growth,
            const std::vector<CarriedRobot>& robots, const Change& change) {
   return std::all_of(std::begin(kBoth), std::end(kBoth), [&](Direction direction) {
     Loop loop = loopOf(controller, task.initial_joints, direction);
+    loop.allowed_growth = growth;
     change(loop);
     return decaysWithAll(loop, robots);
   });
@@ -102,7 +103,7 @@ Uncertainty uncertaintyOf(const Compensation& c) {
 
 /// Of the eight corners of what the belief may be off by, one where the loop grows.
 std::optional<std::array<int, 3>> cornerThatGrows(const ControllerConfig& controller,
-                                                  const RobotTask& task,
+                                                  const RobotTask& task, double growth,
                                                   const std::vector<CarriedRobot>& robots) {
   const Compensation& c = controller.compensation;
   if (!c.inertia) return {};
@@ -114,8 +115,9 @@ std::optional<std::array<int, 3>> cornerThatGrows(const ControllerConfig& contro
   for (const int gain : {1, -1})
     for (const int timing : {1, -1}) {
       const auto change = [&](Loop& l) { l = off(l, by, timing, gain); };
-      if (!holds(controller, task, both, change))
-        return std::array<int, 3>{timing, gain, holds(controller, task, heavy, change) ? -1 : 1};
+      if (!holds(controller, task, growth, both, change))
+        return std::array<int, 3>{timing, gain,
+                                  holds(controller, task, growth, heavy, change) ? -1 : 1};
     }
   return {};
 }
@@ -140,10 +142,15 @@ std::vector<ProgramRobot> programRobots(const ControllerConfig& controller, cons
   return out;
 }
 
-bool isStable(const ControllerConfig& controller, const RobotTask& task) {
+double allowedGrowth(const ControllerConfig& controller) {
+  const double longest = controller.longestAdmittance();
+  return longest > 0.0 ? std::log(controller.most_growth) / longest : 0.0;
+}
+
+bool isStable(const ControllerConfig& controller, const RobotTask& task, double growth) {
   const std::vector<CarriedRobot> robots = bodies(controller, task);
-  return holds(controller, task, robots, [](Loop&) {}) &&
-         !cornerThatGrows(controller, task, robots);
+  return holds(controller, task, growth, robots, [](Loop&) {}) &&
+         !cornerThatGrows(controller, task, growth, robots);
 }
 
 bool contactsDecay(const ControllerConfig& controller, const RobotTask& task) {
@@ -162,14 +169,27 @@ LoopVerdict assessStability(const ControllerConfig& controller, const RobotTask&
   out.modes = static_cast<int>(controller.admittance.stiffness.size());
   out.stable_modes = out.modes;
   const std::vector<CarriedRobot> robots = bodies(controller, task);
-  const auto cured = [&](const auto& change) { return holds(controller, task, robots, change); };
+  const double growth = allowedGrowth(controller);
+  const auto cured = [&](const auto& change) {
+    return holds(controller, task, growth, robots, change);
+  };
+  out.longest = controller.longestAdmittance();
   out.as_believed = cured([](Loop&) {});
   out.stable = out.as_believed;
   if (out.as_believed)
-    if (const auto corner = cornerThatGrows(controller, task, robots)) {
+    if (const auto corner = cornerThatGrows(controller, task, growth, robots)) {
       out.stable = false;
       out.off = *corner;
       out.uncertainty = uncertaintyOf(controller.compensation);
+      const auto& [timing, gain, mass] = out.off;
+      for (const Direction direction : kBoth)
+        for (CarriedRobot robot : robots) {
+          robot.robot_P = heavier(1.0 + mass * out.uncertainty.mass, robot.robot_P);
+          const DominantRoot root =
+              dominantRoot(off(carrying(loopOf(controller, task.initial_joints, direction), robot),
+                               out.uncertainty, timing, gain));
+          if (root.radius > out.at_off.radius) out.at_off = root;
+        }
     }
   double largest = 0.0;
   for (const Direction direction : kBoth) {
@@ -188,6 +208,7 @@ LoopVerdict assessStability(const ControllerConfig& controller, const RobotTask&
     out.direction = direction;
   }
   out.worst = dominantRoot(out.direction == Direction::kExtending ? out.extending : out.retracting);
+  if (out.stable && !isStable(controller, task)) out.stable_for = out.longest;
   if (out.as_believed) return out;
   out.stable_modes = 0;
   while (out.stable_modes < out.modes &&
@@ -204,16 +225,26 @@ LoopVerdict assessStability(const ControllerConfig& controller, const RobotTask&
   return out;
 }
 
+/// "0.52 Hz, doubling every 3.1 s, 12 times as much after the 11 s of its segment".
+std::string explain(const DominantRoot& root, double longest) {
+  const std::string until =
+      longest > 0.0 ? fmt::format(", {:.3g} times as much after the {:.4g} s of its segment",
+                                  std::exp(root.growth * longest), longest)
+                    : "";
+  return fmt::format("{:.2f} Hz, doubling every {:.2g} s{}", root.frequency,
+                     std::log(2.0) / root.growth, until);
+}
+
 std::string explain(const LoopVerdict& v) {
   if (v.as_believed)
     return fmt::format(
         "the loop of base, robot and machine would decay as believed, but diverge with a wrench "
-        "{:.3g} ms {}, servos {:.3g} % {} and a robot {:.3g} % {}. What cures it: better beliefs "
-        "(timing_error_s, gain_error and mass_error of controller.compensation), a lighter robot "
-        "or a heavier base",
+        "{:.3g} ms {}, servos {:.3g} % {} and a robot {:.3g} % {}: {}. What cures it: better "
+        "beliefs (timing_error_s, gain_error and mass_error of controller.compensation), a lighter "
+        "robot or a heavier base",
         1e3 * v.uncertainty.timing, v.off[0] > 0 ? "later" : "earlier", 100.0 * v.uncertainty.gain,
         v.off[1] > 0 ? "quicker" : "slower", 100.0 * v.uncertainty.mass,
-        v.off[2] > 0 ? "heavier" : "lighter");
+        v.off[2] > 0 ? "heavier" : "lighter", explain(v.at_off, v.longest));
   Eigen::Index i = 0;
   v.worst.shape.cwiseAbs().maxCoeff(&i);
   std::string cure;
@@ -224,28 +255,35 @@ std::string explain(const LoopVerdict& v) {
   if (v.K_P > 0.0) add(fmt::format("{:.0f} percent of K_P", 100.0 * v.K_P));
   if (cure.empty()) cure = "a lighter robot or a heavier base";
   return fmt::format(
-      "the loop of base, robot and machine would diverge: {:.2f} Hz, most in {}, doubling every "
-      "{:.2g} s (legs {}). What cures it: {}",
-      v.worst.frequency, coordinate(static_cast<int>(i)).name, std::log(2.0) / v.worst.growth,
+      "the loop of base, robot and machine would diverge: {}, most in {} (legs {}). What cures it: "
+      "{}",
+      explain(v.worst, v.longest), coordinate(static_cast<int>(i)).name,
       v.direction == Direction::kExtending ? "extending" : "retracting", cure);
 }
 
 std::string applyStabilityCheck(ControllerConfig& controller, const RobotTask& task) {
-  const auto verdict = [&](const ControllerConfig& c) {
-    return isStable(c, task) && contactsDecay(c, task) ? Stability::kStable : Stability::kUnstable;
+  const auto assess = [&](const ControllerConfig& c, Stability& verdict, double& stable_for) {
+    const bool decays = isStable(c, task);
+    verdict = (decays || isStable(c, task, allowedGrowth(c))) && contactsDecay(c, task)
+                  ? Stability::kStable
+                  : Stability::kUnstable;
+    stable_for = decays ? HUGE_VAL : c.longestAdmittance();
   };
   const bool forced = controller.stability == Stability::kForced;
-  const Stability as_is = verdict(controller);
+  Stability as_is = Stability::kUnknown;
+  assess(controller, as_is, controller.stable_for);
   controller.stability_uncompensated = as_is;
+  controller.stable_for_uncompensated = controller.stable_for;
   if (controller.compensation.any()) {
     ControllerConfig published = controller;
     published.compensation = {};
-    controller.stability_uncompensated = verdict(published);
+    assess(published, controller.stability_uncompensated, controller.stable_for_uncompensated);
   }
   controller.stability = as_is;
   if (forced) controller.stability = controller.stability_uncompensated = Stability::kForced;
   if (as_is == Stability::kStable) return "";
-  if (!isStable(controller, task)) return explain(assessStability(controller, task));
+  if (const LoopVerdict verdict = assessStability(controller, task); !verdict.stable)
+    return explain(verdict);
   std::string why;
   for (const ContactVerdict& one : assessContacts(controller, task))
     if (one.grows) why += (why.empty() ? "" : "; ") + explain(one);

@@ -140,7 +140,7 @@ bool decays(const Loop& loop, const Lifted& lifted) {
   constexpr double kDriftRate = 2.0 * M_PI * 0.01, kDriftGrowth = 0.02;  // [rad/s], [1/s]
   const Eigen::VectorXcd roots = eigenvalues(systemOf(loop, lifted));
   return std::all_of(roots.begin(), roots.end(), [&](const std::complex<double>& root) {
-    if (std::abs(root) <= 1.0 + kRounding) return true;
+    if (std::abs(root) <= std::exp(loop.allowed_growth * loop.period) + kRounding) return true;
     return std::abs(std::arg(root)) < kDriftRate * loop.period &&
            std::abs(root) < 1.0 + kDriftGrowth * loop.period;
   });

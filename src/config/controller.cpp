@@ -17,6 +17,11 @@ Stability readStability(Section& controller, const char* key) {
       std::begin(kStabilityNames));
 }
 
+/// [s] written by the stability check where the loop grows, slowly; without the key for good.
+double readStableFor(Section& controller, const char* key) {
+  return controller.has(key) ? controller.number(key, 0.0, 1e9) : HUGE_VAL;
+}
+
 /// What goes beyond the report; without the key all of it is off.
 Compensation readCompensation(Section& controller) {
   Compensation c;
@@ -73,6 +78,9 @@ void readController(Section s, ControllerConfig& c) {
   c.arming_samples = static_cast<int>(s.integer("arming_samples", 1, 10'000));
   c.stability = readStability(s, "stability");
   c.stability_uncompensated = readStability(s, "stability_uncompensated");
+  c.stable_for = readStableFor(s, "stable_for_s");
+  c.stable_for_uncompensated = readStableFor(s, "stable_for_uncompensated_s");
+  if (s.has("most_growth")) c.most_growth = s.number("most_growth", 1.0, 100.0);
   c.tare_ramp = s.number("tare_ramp_s", 0.01, 100.0);
   c.compensation = readCompensation(s);
   c.passivity = readPassivity(s);

@@ -255,14 +255,21 @@ Experiment parseExperiment(const std::string& resolved, const std::string& name)
 std::string applyStabilityCheck(Experiment& e) {
   const std::string why = applyStabilityCheck(e.controller, e.plant.task);
   Value& controller = *e.source.document.find("controller");
-  const auto put = [&](const char* key, Stability verdict) {
+  const auto put = [&](const char* key, std::string text) {
     Value value;
     value.kind = Value::Kind::kScalar;
-    value.text = kStabilityNames[static_cast<std::size_t>(verdict)];
+    value.text = std::move(text);
     controller.put(key, value);
   };
-  put("stability", e.controller.stability);
-  put("stability_uncompensated", e.controller.stability_uncompensated);
+  const auto verdict = [](Stability s) {
+    return std::string(kStabilityNames[static_cast<std::size_t>(s)]);
+  };
+  const ControllerConfig& c = e.controller;
+  put("stability", verdict(c.stability));
+  put("stability_uncompensated", verdict(c.stability_uncompensated));
+  if (std::isfinite(c.stable_for)) put("stable_for_s", fmt::format("{}", c.stable_for));
+  if (std::isfinite(c.stable_for_uncompensated))
+    put("stable_for_uncompensated_s", fmt::format("{}", c.stable_for_uncompensated));
   e.source.resolved = emit(e.source.document);
   e.source.hash = fingerprint(e.source.resolved);
   return why;

@@ -49,6 +49,7 @@ std::string_view name(Refusal refusal) noexcept {
     case Refusal::kLoaded: return "the measured wrench is too large: calibrate, or remove the load";
     case Refusal::kChecking: return "its path is being checked";
     case Refusal::kOvertaken: return "a hold, a stop or a failing check came before it";
+    case Refusal::kTooLong: return "the loop grows slowly, and would grow too much in that time";
     case Refusal::kCount: break;
   }
   return "unknown";

@@ -12,10 +12,11 @@ bool forbids(Tripped tripped) {
   return (tripped.bits() & ~waiting.bits()) != 0;
 }
 
-/// Why a loop of this verdict may not be closed.
-Refusal refusesLoop(Stability stability) {
-  switch (stability) {
-    case Stability::kStable:
+/// Why the loop, its compensation in or out, may not be closed for `duration` [s].
+Refusal refusesLoop(const ControllerConfig& config, bool compensated, double duration) {
+  const double stable_for = compensated ? config.stable_for : config.stable_for_uncompensated;
+  switch (config.stabilityOf(compensated)) {
+    case Stability::kStable: return duration <= stable_for ? Refusal::kNone : Refusal::kTooLong;
     case Stability::kForced: return Refusal::kNone;
     case Stability::kUnstable: return Refusal::kUnstable;
     case Stability::kUnknown: break;
@@ -74,7 +75,8 @@ bool Supervisor::ours() const noexcept {
 }
 
 Refusal Supervisor::arm(Request request, const Situation& now, Actuation act) noexcept {
-  const Refusal unstable = refusesLoop(now.config.stabilityOf(act.share.wanted()));
+  const Refusal unstable =
+      refusesLoop(now.config, act.share.wanted(), now.config.longestAdmittance());
   if (request == Request::kStart && unstable != Refusal::kNone &&
       wantsAdmittance(now.config.program))
     return unstable;
@@ -97,7 +99,7 @@ Refusal Supervisor::run(const Segment& segment, const Situation& now, Actuation 
   if (phase_ != Phase::kArmed || rehearsal_.underWay() || pending_request_ == Request::kStart)
     return Refusal::kBusy;
   if (segment.kind == SegmentKind::kAdmittance) {
-    const Refusal refusal = refusesAdmittance(now, act);
+    const Refusal refusal = refusesAdmittance(segment, now, act);
     if (refusal != Refusal::kNone) return refusal;
   }
   if (segment.kind == SegmentKind::kMove || segment.kind == SegmentKind::kTrajectory) {
@@ -132,7 +134,9 @@ void Supervisor::forgetRehearsal() noexcept {
 /// A loop that runs is not changed to one that would diverge.
 Refusal Supervisor::compensate(bool in, const Situation& now, Actuation act) noexcept {
   if (!act.share.exists()) return Refusal::kNoCompensation;
-  const Refusal unstable = refusesLoop(now.config.stabilityOf(in));
+  // What runs by an order may go on for longer than the program's segments.
+  const double duration = segment_ < 0 ? HUGE_VAL : now.config.longestAdmittance();
+  const Refusal unstable = refusesLoop(now.config, in, duration);
   if (unstable != Refusal::kNone && runs(act.motion, SegmentKind::kAdmittance)) return unstable;
   act.share.want(in);
   return Refusal::kNone;
@@ -152,8 +156,9 @@ Refusal Supervisor::reset(Actuation act) noexcept {
 }
 
 /// Admittance control should begin with nothing but the base's own motion to come.
-Refusal Supervisor::refusesAdmittance(const Situation& now, Actuation act) const noexcept {
-  const Refusal unstable = refusesLoop(now.config.stabilityOf(act.share.wanted()));
+Refusal Supervisor::refusesAdmittance(const Segment& segment, const Situation& now,
+                                      Actuation act) const noexcept {
+  const Refusal unstable = refusesLoop(now.config, act.share.wanted(), segment.duration);
   if (unstable != Refusal::kNone) return unstable;
   const bool unloaded = now.dynamic.f.norm() <= now.config.safety.start_force &&
                         now.dynamic.n.norm() <= now.config.safety.start_moment;
@@ -232,7 +237,7 @@ void Supervisor::beginProgram(int at, const Situation& now, Actuation act) noexc
   }
   const Segment& next = now.config.program.segments[static_cast<std::size_t>(at)];
   const Refusal refusal =
-      next.kind == SegmentKind::kAdmittance ? refusesAdmittance(now, act) : Refusal::kNone;
+      next.kind == SegmentKind::kAdmittance ? refusesAdmittance(next, now, act) : Refusal::kNone;
   if (refusal != Refusal::kNone) {
     abort(refusal, now, act);
     return;

@@ -16,10 +16,13 @@ namespace ves {
 /// programRobots(). With the inertia compensated it has to decay also where the belief is off by
 /// what it may be: the wrench's time, the servos' gain and the robot's mass, each up or down.
 struct LoopVerdict {
-  bool stable = true;
-  bool as_believed = true;   // it would be, were the belief exact
-  Uncertainty uncertainty;   // that it is judged for,
-  std::array<int, 3> off{};  // [-] and where not: timing, gain and mass, -1 or 1
+  bool stable = true;            // or grows as little as ControllerConfig::most_growth allows
+  double stable_for = HUGE_VAL;  // [s] of one segment, for which that holds
+  double longest = 0.0;          // [s] of the program's admittance segments
+  bool as_believed = true;       // it would be, were the belief exact
+  Uncertainty uncertainty;       // that it is judged for,
+  std::array<int, 3> off{};      // [-] and where not: timing, gain and mass, -1 or 1,
+  DominantRoot at_off;           // and what grows there
   DominantRoot worst;
   Direction direction = Direction::kExtending;
   Loop extending, retracting;  // in the pose where each is worst
@@ -43,8 +46,12 @@ struct ProgramRobot {
 /// monitor looks at that.
 std::vector<ProgramRobot> programRobots(const ControllerConfig& controller, const RobotTask& task);
 
-/// Whether the loop decays at its worst. Much less work than the rest of the verdict.
-bool isStable(const ControllerConfig& controller, const RobotTask& task);
+/// Whether the loop decays at its worst, or grows by `growth` [1/s] at most. Much less work than
+/// the rest of the verdict.
+bool isStable(const ControllerConfig& controller, const RobotTask& task, double growth = 0.0);
+/// [1/s] that is let pass: by a factor of ControllerConfig::most_growth until the longest
+/// admittance segment of the program ends; without one, 0.
+double allowedGrowth(const ControllerConfig& controller);
 /// Whether the tool may lean on all that it is expected to touch (analysis/contact.hpp), or what
 /// that gives is taken back by the passivity controller.
 bool contactsDecay(const ControllerConfig& controller, const RobotTask& task);

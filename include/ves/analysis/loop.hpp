@@ -48,6 +48,7 @@ struct Loop {
   int readings = 1;              // [-] of the A/D converter, averaged over a period
   double late = 0.0;             // [s] by which a wrench is later than anybody knows
   int delay = 0;                 // [ticks] that a sample is older than it need be, and says so
+  double allowed_growth = 0.0;   // [1/s] that decays() lets pass
   std::optional<Leaning> contact;
   /// Of the compensation, when it is on.
   struct Model {
@@ -110,8 +111,9 @@ double radius(const Loop& loop);
 /// All of them, in no order.
 Eigen::VectorXcd roots(const Loop& loop);
 
-/// No root outside the unit circle. A base that is free in a direction drifts, and a robot on it
-/// may turn drift (below 0.01 Hz) into a growth that takes minutes: that is let pass, up to 0.02/s.
+/// No root outside the unit circle, but for the growth that is allowed. A base that is free in a
+/// direction drifts, and a robot on it may turn drift (below 0.01 Hz) into a growth that takes
+/// minutes: that is let pass, up to 0.02/s.
 bool decays(const Loop& loop);
 
 /// The same, carrying each of these robots in turn; most of the work is done once for all of them.

@@ -109,6 +109,19 @@ struct ControllerConfig : Belief {
   Stability stability = Stability::kUnknown;                // of admittance control as configured,
   Stability stability_uncompensated = Stability::kUnknown;  // and with the compensation out
 
+  // [s] of one segment, for which that holds.
+  double stable_for = HUGE_VAL, stable_for_uncompensated = HUGE_VAL;
+  double most_growth = 1.0;  // [-] of a motion until its segment ends, that is let pass
+
+  /// [s] the longest admittance segment of the program; 0: none.
+  double longestAdmittance() const noexcept {
+    double longest = 0.0;
+    for (int i = 0; i < program.size; ++i) {
+      const Segment& s = program.segments[static_cast<std::size_t>(i)];
+      if (s.kind == SegmentKind::kAdmittance) longest = std::max(longest, s.duration);
+    }
+    return longest;
+  }
   /// Of admittance control, its compensation in or out.
   Stability stabilityOf(bool compensated) const noexcept {
     return compensated ? stability : stability_uncompensated;

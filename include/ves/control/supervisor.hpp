@@ -73,7 +73,8 @@ class Supervisor {
   void abort(Refusal why, const Situation& now, Actuation act) noexcept;
   Refusal compensate(bool in, const Situation& now, Actuation act) noexcept;
   Refusal reset(Actuation act) noexcept;
-  Refusal refusesAdmittance(const Situation& now, Actuation act) const noexcept;
+  Refusal refusesAdmittance(const Segment& segment, const Situation& now,
+                            Actuation act) const noexcept;
   bool ours() const noexcept;
   void beginProgram(int at, const Situation& now, Actuation act) noexcept;
   void begin(const Segment& segment, const Situation& now, Actuation act) noexcept;
