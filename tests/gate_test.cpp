@@ -279,5 +279,29 @@ TEST(Gate, LooksAtTheServosThatWereIdentified) {
       0.75 * nominal, 1e-12 * nominal);
 }
 
+// An undamped base whose loop grows by less than a thousandth in a minute, and by much in a week.
+TEST(Gate, HoldsSlowGrowthAgainstTheLengthOfTheRun) {
+  const auto assessed = [](double seconds, double most) {
+    Experiment e = test::unassessed(
+        "puma_on_table_4_1",
+        {"sensor.readings_per_tick=10",
+         "base.stiffness_diagonal=[4935, 4935, 4935, 2467, 2467, 2467]",
+         "base.damping_diagonal=[0, 0, 0, 0, 0, 0]", fmt::format("controller.most_growth={}", most),
+         "controller.compensation.feed_forward=true", "controller.compensation.observer=true",
+         "controller.compensation.inertia=true",
+         fmt::format("program=[{{move: {{}}}}, {{admittance: {{duration_s: {}}}}}]", seconds)});
+    applyStabilityCheck(e);
+    return e.controller;
+  };
+  const ControllerConfig minute = assessed(60.0, 1.1), week = assessed(6e5, 1.1);
+  EXPECT_EQ(minute.stability, Stability::kStable);
+  EXPECT_EQ(minute.stable_for, 60.0);
+  EXPECT_EQ(week.stability, Stability::kUnstable);
+  EXPECT_EQ(assessed(60.0, 1.0).stability, Stability::kUnstable);  // nothing is let pass
+  // The published loop decays, for as long as one likes.
+  EXPECT_EQ(minute.stable_for_uncompensated, HUGE_VAL);
+  EXPECT_EQ(week.stability_uncompensated, Stability::kStable);
+}
+
 }  // namespace
 }  // namespace ves

@@ -276,7 +276,10 @@ TEST(Overruns, OneStallOrTooManyInASecondAndNoMoreAfterIt) {
 TEST(Oscillation, NeedsGrowthInEveryWindowAboveItsFloorWhileTheRobotStands) {
   SafetyLimits limits;
   limits.growing_windows = 4;
-  const double floor = 0.05, period = 0.01;
+  limits.window = 0.5;
+  limits.window_growth = 1.2;
+  limits.growth_floor = 0.05;
+  const double period = 0.01;
   const auto windows = [&](double first, double factor, int n, double moved = 0.0) {
     Oscillation o;
     JointVector q = JointVector::Zero();
@@ -284,7 +287,7 @@ TEST(Oscillation, NeedsGrowthInEveryWindowAboveItsFloorWhileTheRobotStands) {
     for (int w = 0; w < n; ++w, energy *= factor)
       for (int i = 0; i < 50; ++i) {
         q(0) += moved;
-        o.take(energy, false, q, 1e-3, period, floor);
+        o.take(limits, energy, false, q, 1e-3, period);
       }
     return o.good(limits);
   };
@@ -299,9 +302,12 @@ TEST(Oscillation, NeedsGrowthInEveryWindowAboveItsFloorWhileTheRobotStands) {
 TEST(Oscillation, SwingingOnAgainstTheEnvelopeCountsAsGrowth) {
   SafetyLimits limits;
   limits.growing_windows = 4;
+  limits.window = 0.5;
+  limits.window_growth = 1.2;
+  limits.growth_floor = 0.05;
   Oscillation o;
   for (int i = 0; i < 4 * 50 + 1; ++i)
-    o.take(1.0, i % 50 == 7, JointVector::Zero(), 1e-3, 0.01, 0.05);
+    o.take(limits, 1.0, i % 50 == 7, JointVector::Zero(), 1e-3, 0.01);
   EXPECT_FALSE(o.good(limits));
   o.reset();
   EXPECT_TRUE(o.good(limits));
@@ -327,22 +333,26 @@ TEST(FrozenSensor, TripsWhenTheWeightTurnsUnderEqualReadings) {
 }
 
 TEST(LegReadings, AllowsWhatALegCanDoAndOneErrorInARow) {
+  SafetyLimits limits;
+  limits.reading_jump = 0.002;
+  limits.reading_speed = 1.5;
+  limits.reading_patience = 1;
   LegReadings readings;
   const Vec6 at = Vec6::Constant(1.5), still = Vec6::Zero();
-  readings.take(at, still, 0.01, 0.002);
-  EXPECT_EQ(readings.take(Vec6(at + 0.0019 * Vec6::Unit(0)), still, 0.01, 0.002)(0), 1.5019);
+  readings.take(limits, at, still, 0.01);
+  EXPECT_EQ(readings.take(limits, Vec6(at + 0.0019 * Vec6::Unit(0)), still, 0.01)(0), 1.5019);
   const Vec6 jumped = at + 0.01 * Vec6::Unit(4);
-  EXPECT_NE(readings.take(jumped, still, 0.01, 0.002), jumped);
-  EXPECT_TRUE(readings.good());
-  EXPECT_NE(readings.take(jumped, still, 0.01, 0.002), jumped);
-  EXPECT_FALSE(readings.good());
+  EXPECT_NE(readings.take(limits, jumped, still, 0.01), jumped);
+  EXPECT_TRUE(readings.good(limits));
+  EXPECT_NE(readings.take(limits, jumped, still, 0.01), jumped);
+  EXPECT_FALSE(readings.good(limits));
   readings.reset();
-  EXPECT_EQ(readings.take(jumped, still, 0.01, 0.002), jumped);
-  EXPECT_TRUE(readings.good());
+  EXPECT_EQ(readings.take(limits, jumped, still, 0.01), jumped);
+  EXPECT_TRUE(readings.good(limits));
   // A leg that was told 0.4 m/s may come 6 mm further in 10 ms, beside the jump.
-  EXPECT_EQ(readings.take(Vec6(jumped + 0.0079 * Vec6::Unit(1)), Vec6::Constant(0.4), 0.01, 0.002),
+  EXPECT_EQ(readings.take(limits, Vec6(jumped + 0.0079 * Vec6::Unit(1)), Vec6::Constant(0.4), 0.01),
             Vec6(jumped + 0.0079 * Vec6::Unit(1)));
-  EXPECT_NE(readings.take(Vec6(jumped + 0.0165 * Vec6::Unit(1)), Vec6::Constant(0.4), 0.01, 0.002),
+  EXPECT_NE(readings.take(limits, Vec6(jumped + 0.0165 * Vec6::Unit(1)), Vec6::Constant(0.4), 0.01),
             Vec6(jumped + 0.0165 * Vec6::Unit(1)));
 }
 

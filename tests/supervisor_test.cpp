@@ -92,6 +92,26 @@ TEST(Supervisor, AdmittanceControlNeedsAVerdictAndALightSensor) {
   }
 }
 
+TEST(Supervisor, ALoopThatGrowsSlowlyIsLetPassForSoLong) {
+  ControllerConfig config = puma();
+  config.stability = config.stability_uncompensated = Stability::kStable;
+  config.stable_for_uncompensated = 20.0;
+  for (const auto& [duration, refusal] :
+       {std::pair{20.0, Refusal::kNone}, {20.01, Refusal::kTooLong}, {kNan, Refusal::kTooLong}}) {
+    Desk desk(config);
+    desk.arm();
+    EXPECT_EQ(desk.order(Request::kRun, test::segment(SegmentKind::kAdmittance, duration)).refusal,
+              refusal);
+  }
+  // What an order began may last longer than that: its loop is not changed to such a one.
+  config.compensation.feed_forward = true;
+  Desk desk(config);
+  desk.arm();
+  EXPECT_EQ(desk.order(Request::kRun, test::segment(SegmentKind::kAdmittance, 60.0)).refusal,
+            Refusal::kNone);
+  EXPECT_EQ(desk.order(Request::kUncompensate).refusal, Refusal::kTooLong);
+}
+
 TEST(Supervisor, TheVerdictIsOfTheLoopAsItIsCompensated) {
   ControllerConfig config = puma();
   config.compensation.feed_forward = true;

@@ -61,8 +61,8 @@ class ToolPath : public testing::TestWithParam<Arm> {
   const UrdfRobot robot = test::robot(GetParam().name);
   const KDL::Chain chain = test::kdlChain(GetParam().name);
   const NamedFrame& tip = robot.frames.back();
-  const ToolPlanner planner{robot.model, tip.link, tip.X_link, JointVector::Constant(HUGE_VAL),
-                            robot.joint_names};
+  const ToolPlanner planner{
+      robot.model, tip.link, tip.X_link, JointVector::Constant(HUGE_VAL), robot.joint_names, 0.01};
   JointVector q0 = JointVector::Zero();
 };
 
@@ -226,8 +226,8 @@ class Scara : public testing::Test {
     return test::refusal([&] { planner.plan(q0, {to, {}, duration, 0.0}); });
   }
   const UrdfRobot robot = loadUrdf(kScara, "scara.urdf");
-  const ToolPlanner planner{robot.model, robot.frames.back().link, robot.frames.back().X_link,
-                            robot.fastest, robot.joint_names};
+  const ToolPlanner planner{robot.model,   robot.frames.back().link, robot.frames.back().X_link,
+                            robot.fastest, robot.joint_names,        0.01};
   const JointVector q0 = [] {
     JointVector q = JointVector::Zero();
     q(1) = 0.5;
@@ -259,7 +259,7 @@ TEST_F(Scara, KeepsAHandThatItCannotTurnFreely) {
 TEST(ToolPlanner, AStraightWristIsSingular) {  // the axes of joints 4 and 6 are one
   const UrdfRobot puma = test::robot("puma560");
   const NamedFrame& tip = puma.frames.back();
-  const ToolPlanner planner(puma.model, tip.link, tip.X_link, puma.fastest, puma.joint_names);
+  const ToolPlanner planner(puma.model, tip.link, tip.X_link, puma.fastest, puma.joint_names, 0.01);
   const auto said = [&](double joint_5) {
     JointVector q = JointVector::Zero();
     for (int i = 0; i < 6; ++i) q(i) = kPuma.degrees[static_cast<std::size_t>(i)] * kDegree;

@@ -141,7 +141,8 @@ ToolPlanner& RobotEvents::planner(const Section& s) {
   try {
     if (!planner_)
       planner_ = std::make_unique<ToolPlanner>(robot_.model, frame.link, frame.X_link,
-                                               robot_.fastest, robot_.joint_names);
+                                               robot_.fastest, robot_.joint_names,
+                                               out_.controller.safety.tool_singularity);
   } catch (const InputError& error) {
     s.fail("tool", error.what());
   }

@@ -49,6 +49,15 @@ SafetyLimits readSafety(Section s, const Geometry& geometry, const WorkspaceUse&
       s.numberOr("position_error_still_m", kTiny, 10.0, derived.position_error_still);
   l.position_error_lag = s.numberOr("position_error_lag_s", 0.0, 10.0, derived.position_error_lag);
   l.reading_jump = s.numberOr("reading_jump_m", kTiny, 10.0, derived.reading_jump);
+  // Logs from before these were keys lack them, and ran with these numbers.
+  const auto known = [&](const char* key, double lo, double hi, double before) {
+    return s.has(key) ? s.number(key, lo, hi) : before;
+  };
+  l.reading_speed = known("reading_speed", 1.0, 100.0, 1.5);
+  l.speed_memory = known("speed_memory_s", 0.01, 100.0, 0.3);
+  l.reading_patience = static_cast<int>(known("reading_patience", 0.0, 100.0, 1.0));
+  l.window = known("growth_window_s", 0.01, 100.0, 0.5);
+  l.window_growth = known("window_growth", 1.0, 100.0, 1.2);
   l.translation = s.number("translation_m", kTiny, 10.0);
   l.rotation = s.number("rotation_deg", kTiny, 85.0) * kDegree;
   l.leg_min = s.numberOr("leg_min_m", kTiny, 20.0, derived.leg_min);
@@ -73,6 +82,7 @@ SafetyLimits readSafety(Section s, const Geometry& geometry, const WorkspaceUse&
   l.frozen_counts = s.number("frozen_counts", 0.0, 65536.0);
   l.growing_windows = static_cast<int>(s.integer("growing_windows", 1, 1000));
   l.growth_floor = s.number("growth_floor_j", 0.0, 1e6);
+  l.tool_singularity = known("tool_singularity", 0.0, 1.0, 0.01);
   l.start_force = s.number("start_force_n", kTiny, 1e6);
   l.start_moment = s.number("start_moment_nm", kTiny, 1e6);
   requireHome(s, l, geometry);

@@ -78,12 +78,14 @@ Compensation withRecord(Compensation nominal, const ServoRecord& record) {
   const auto share = [&](Vec6 ServoModel::*value) {
     return (record.deviation.*value).cwiseQuotient(record.servo.*value).maxCoeff();
   };
-  const auto atLeast = [](double& value, double deviation) {
-    value = std::max(value, kDeviations * deviation);
+  // What may be learnt needs the room that was given for it.
+  const auto take = [&](double& value, double deviation) {
+    const double found = kDeviations * deviation;
+    if (deviation > 0.0) value = nominal.adaptation ? std::max(value, found) : found;
   };
-  atLeast(nominal.gain_error, std::max(share(&ServoModel::extend), share(&ServoModel::retract)));
-  atLeast(nominal.timing_error, record.deviation.sensor_delay);
-  atLeast(nominal.mass_error, record.deviation.sensor_scale);
+  take(nominal.gain_error, std::max(share(&ServoModel::extend), share(&ServoModel::retract)));
+  take(nominal.timing_error, record.deviation.sensor_delay);
+  take(nominal.mass_error, record.deviation.sensor_scale);
   return nominal;
 }
 

@@ -15,7 +15,6 @@ AdmittanceControl::AdmittanceControl(const ControllerConfig& config)
       energy_(config),
       period_(config.periodSeconds()),
       joint_moves_(config.stillness.joint),
-      growth_floor_(config.safety.growth_floor),
       braking_(config.gentle.braking),
       slow_(std::min(config.safety.leg_velocity, config.safety.flow / config.safety.bore_area)) {
   constexpr double kTurns = 2.0;  // [-] angular velocity per rates of the fixed angles, at most
@@ -44,8 +43,9 @@ const PathPoint<6>& AdmittanceControl::step(const AdmittanceInput& in, const Vec
     slowInsideEnvelope(last, in.L, checks);
     energy_.take(model_.taken(in.F_Po_I), port_.take(in.F_Po_I, in.wrench.time, in.X_IP, in.servo),
                  model_.damped(), model_.kineticEnergy());
-    const bool held = scale_ < 1.0 && model_.kineticEnergy() > growth_floor_;
-    oscillation_.take(model_.energy(), held, in.q, joint_moves_, period_, growth_floor_);
+    const SafetyLimits& limits = checks.limits();
+    const bool held = scale_ < 1.0 && model_.kineticEnergy() > limits.growth_floor;
+    oscillation_.take(limits, model_.energy(), held, in.q, joint_moves_, period_);
   }
   return model_.motion();
 }

@@ -9,7 +9,7 @@ LegEstimator::LegEstimator(const ControllerConfig& config)
     : geometry_(config.geometry),
       codec_(config.legs),
       period_(config.periodSeconds()),
-      reading_jump_(config.safety.reading_jump),
+      limits_(config.safety),
       feels_(config.compensation.inertia),
       adapts_(config.compensation.adaptation),
       servo_(config.servo, period_),
@@ -22,12 +22,12 @@ LegEstimator::LegEstimator(const ControllerConfig& config)
 
 const Measured& LegEstimator::update(const SampleStream& samples, const Elapsed& elapsed,
                                      bool following, const LegCommander& sent) noexcept {
-  speed_.step(sent.legs().L_dot, period_);
+  speed_.step(sent.legs().L_dot, period_, limits_.speed_memory);
   if (!following) readings_.reset();
   if (samples.fresh() || !following) {
     const auto waited = static_cast<double>(samples.ageBefore() + elapsed.between + 1) * period_;
-    measured_.L = readings_.take(legLengths(codec_, samples.sample().legs), speed_.speed(), waited,
-                                 reading_jump_);
+    measured_.L =
+        readings_.take(limits_, legLengths(codec_, samples.sample().legs), speed_.speed(), waited);
   }
   const Sample& sample = samples.sample();
   if (!following) {

@@ -6,13 +6,13 @@
 
 namespace ves {
 
-const Vec6& LegReadings::take(const Vec6& L, const Vec6& speed, double time, double jump) noexcept {
-  // A servo catches up at more than the speed it was told, but not at half as much again.
-  constexpr double kCatchUp = 1.5;  // [-]
+const Vec6& LegReadings::take(const SafetyLimits& limits, const Vec6& L, const Vec6& speed,
+                              double time) noexcept {
+  // A servo that catches up is faster than it was told.
+  const double reach = limits.reading_speed * (wrong_ + 1) * time;  // [s]
   bool plausible = true;
   for (int i = 0; i < kLegs; ++i)
-    plausible =
-        plausible && std::abs(L(i) - L_(i)) <= jump + kCatchUp * speed(i) * (wrong_ + 1) * time;
+    plausible = plausible && std::abs(L(i) - L_(i)) <= limits.reading_jump + reach * speed(i);
   if (known_ && !plausible) {
     ++wrong_;
     return L_;
@@ -48,8 +48,8 @@ bool Overruns::good(const SafetyLimits& limits, std::int64_t ticks_per_second) c
   return tick_ - late_[(count_ - 1 - allowed) % kKept] > ticks_per_second;
 }
 
-void Oscillation::take(double energy, bool held, const JointVector& q, double moved, double period,
-                       double floor) noexcept {
+void Oscillation::take(const SafetyLimits& limits, double energy, bool held, const JointVector& q,
+                       double moved, double period) noexcept {
   if (!((q - q_).cwiseAbs().maxCoeff() <= moved)) {
     reset();
     q_ = q;
@@ -57,9 +57,9 @@ void Oscillation::take(double energy, bool held, const JointVector& q, double mo
   most_ = std::max(most_, energy);
   held_ = held_ || held;
   time_ += period;
-  if (time_ < kWindow) return;
-  const bool grows = most_ > kGrowth * last_ && last_ > 0.0;
-  grown_ = (grows || held_) && most_ > floor ? grown_ + 1 : 0;
+  if (time_ < limits.window) return;
+  const bool grows = most_ > limits.window_growth * last_ && last_ > 0.0;
+  grown_ = (grows || held_) && most_ > limits.growth_floor ? grown_ + 1 : 0;
   last_ = most_;
   most_ = 0.0;
   held_ = false;

@@ -31,7 +31,7 @@ Checked SafetyMonitor::check(const Proposal& p, const LegContext& context,
   t.require(Check::kDevice, sample.faults == 0);
   t.require(Check::kOverrun, overruns_.good(limits, std::llround(1.0 / period_)));
   t.require(Check::kLeftAlone, leftAloneCheck(limits, missed_, period_));
-  t.require(Check::kLegReading, legs.readings().good());
+  t.require(Check::kLegReading, legs.readings().good(checks_.limits()));
   t.require(Check::kForwardKinematics, m.solved);
   t.require(Check::kPositionError,
             positionErrorCheck(limits, context.expected, m.L, legs.recentSpeed()));

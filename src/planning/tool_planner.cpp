@@ -102,8 +102,13 @@ ToolGoal goalOf(const ToolOrder& order, const Transform& X_FL0, const Transform&
 class ToolPlanner::Impl {
  public:
   Impl(const RobotModel& robot, int link, const Transform& X_LinkT, const JointVector& fastest,
-       const std::vector<std::string>& names)
-      : robot_(robot), link_(link), X_LinkT_(X_LinkT), fastest_(fastest), names_(names) {
+       const std::vector<std::string>& names, double singular)
+      : robot_(robot),
+        link_(link),
+        X_LinkT_(X_LinkT),
+        fastest_(fastest),
+        names_(names),
+        singular_(singular) {
     std::vector<int> way;
     for (int i = link; i >= 0; i = robot.link(i).parent) way.insert(way.begin(), i);
     if (way.empty()) throw InputError("no joint moves the tool");
@@ -307,13 +312,13 @@ class ToolPlanner::Impl {
     const Eigen::VectorXd squares = symmetricEigenvalues(J * J.transpose());
     const double least = std::sqrt(std::max(0.0, squares(0))),
                  most = std::sqrt(squares(squares.size() - 1));
-    if (!(least > kSingular * most)) {
+    if (!(least > singular_ * most)) {
       Eigen::Index fastest = joints_.front();
       tangent.cwiseAbs().maxCoeff(&fastest);
       throw InputError(fmt::format(
           "at {:.2f} s the arm is singular (least over largest singular value {:.3g}, want more "
           "than {}), joint '{}' moves most there",
-          t, least / most, kSingular, nameOf(static_cast<int>(fastest))));
+          t, least / most, singular_, nameOf(static_cast<int>(fastest))));
     }
     for (const int i : joints_)
       if (!(std::abs(state.q_dot(i)) <= fastest_(i))) {
@@ -330,6 +335,7 @@ class ToolPlanner::Impl {
   Transform X_LinkT_;
   JointVector fastest_;
   std::vector<std::string> names_;
+  double singular_;          // [-]
   std::vector<int> joints_;  // that move the tool, base first
   KDL::Chain chain_;
   double reach_ = 0.0;  // [m]
@@ -337,8 +343,9 @@ class ToolPlanner::Impl {
 };
 
 ToolPlanner::ToolPlanner(const RobotModel& robot, int link, const Transform& X_LinkT,
-                         const JointVector& fastest, const std::vector<std::string>& names)
-    : impl_(std::make_unique<Impl>(robot, link, X_LinkT, fastest, names)) {}
+                         const JointVector& fastest, const std::vector<std::string>& names,
+                         double singular)
+    : impl_(std::make_unique<Impl>(robot, link, X_LinkT, fastest, names, singular)) {}
 ToolPlanner::~ToolPlanner() = default;
 
 Transform ToolPlanner::pose(const JointVector& q) const { return impl_->pose(q); }

@@ -2,6 +2,7 @@
 #include "ves/results/summary.hpp"
 
 #include <fmt/format.h>
+#include <gsl/gsl_statistics_double.h>
 
 #include <algorithm>
 #include <cmath>
@@ -152,18 +153,12 @@ void addDrift(const Series& series, nlohmann::ordered_json& out) {
   if (all.size() < 3) return;
   out["drift_samples"] = all.size();
   const auto correlation = [&](int i) {
-    double mean_w = 0.0, mean_t = 0.0, ww = 0.0, tt = 0.0, wt = 0.0;
-    for (const DriftSample& l : all) {
-      mean_w += l.wrench(i) / static_cast<double>(all.size());
-      mean_t += l.temperature / static_cast<double>(all.size());
+    std::vector<double> wrench, temperature;
+    for (const DriftSample& one : all) {
+      wrench.push_back(one.wrench(i));
+      temperature.push_back(one.temperature);
     }
-    for (const DriftSample& l : all) {
-      const double w = l.wrench(i) - mean_w, t = l.temperature - mean_t;
-      ww += w * w;
-      tt += t * t;
-      wt += w * t;
-    }
-    return wt / std::sqrt(ww * tt);
+    return gsl_stats_correlation(wrench.data(), 1, temperature.data(), 1, all.size());
   };
   const auto residual = [&](int i, double hours) {
     double most = 0.0;

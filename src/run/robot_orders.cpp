@@ -18,7 +18,8 @@ std::optional<RobotAction> RobotOrders::take(const RobotOrder& order, const plan
   if (planned_.valid()) throw InputError("another tool path is being planned");
   if (!planner_)
     planner_ = std::make_unique<ToolPlanner>(robot.model, frame->link, frame->X_link, robot.fastest,
-                                             robot.joint_names);
+                                             robot.joint_names,
+                                             experiment_.controller.safety.tool_singularity);
   const auto& tool = std::get<ToolOrder>(order);
   const Transform X_FL0 = baseIn(tool.in, truth.P.X, experiment_.plant.payload.X_PL0());
   const JointVector q = truth.joints.q;

@@ -4,22 +4,18 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <poll.h>
-#include <signal.h>
 #include <sys/file.h>
-#include <sys/mman.h>
-#include <sys/prctl.h>
-#include <sys/wait.h>
+#include <tbb/parallel_for_each.h>
+#include <tbb/task_arena.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <charconv>
 #include <cmath>
 #include <cstring>
 #include <fstream>
 #include <map>
-#include <memory>
+#include <mutex>
 
 #include "ves/realtime/realtime.hpp"
 #include "ves/results/summary.hpp"
@@ -122,86 +118,6 @@ std::string rowOf(const SweepPlan& plan, const Value& scenario, std::int64_t run
   }
 }
 
-/// Workers that take the next run from a counter they share, and send rows through one pipe.
-class Workers {
- public:
-  Workers(const SweepPlan& plan, const Value& scenario, int workers,
-          const std::vector<std::int64_t>& missing, int lock)
-      : next_(static_cast<std::atomic<std::size_t>*>(mmap(nullptr, sizeof(std::atomic<std::size_t>),
-                                                          PROT_READ | PROT_WRITE,
-                                                          MAP_SHARED | MAP_ANONYMOUS, -1, 0))) {
-    if (next_ == MAP_FAILED || pipe2(pipe_, O_CLOEXEC) != 0)
-      throw InputError(fmt::format("--workers: {}", std::strerror(errno)));
-    new (next_) std::atomic<std::size_t>(0);
-    for (int w = 0; w < workers; ++w) {
-      const pid_t parent = getpid(), child = fork();
-      if (child < 0) throw InputError(fmt::format("--workers: {}", std::strerror(errno)));
-      if (child == 0) {
-        // Ours alone: a child that outlives us must neither hold the lock nor a pipe open.
-        prctl(PR_SET_PDEATHSIG, SIGKILL);
-        close(lock);
-        close(pipe_[0]);
-        work(plan, scenario, missing, parent);
-      }
-      children_.push_back(child);
-    }
-    close(pipe_[1]);
-    pipe_[1] = -1;
-  }
-  ~Workers() {
-    next_->store(SIZE_MAX / 2);  // no more
-    if (pipe_[0] >= 0) close(pipe_[0]);
-    for (const pid_t child : children_) waitpid(child, nullptr, 0);
-    munmap(next_, sizeof *next_);
-  }
-  Workers(const Workers&) = delete;
-  Workers& operator=(const Workers&) = delete;
-
-  /// The next row; empty when there are no more.
-  std::string row() {
-    for (;;) {
-      const std::size_t end = buffer_.find('\n');
-      if (end != std::string::npos) {
-        std::string line = buffer_.substr(0, end);
-        buffer_.erase(0, end + 1);
-        return line;
-      }
-      char block[4096];
-      const ssize_t n = ::read(pipe_[0], block, sizeof block);
-      if (n < 0 && errno == EINTR) continue;
-      if (n <= 0) return {};
-      buffer_.append(block, static_cast<std::size_t>(n));
-    }
-  }
-
- private:
-  [[noreturn]] void work(const SweepPlan& plan, const Value& scenario,
-                         const std::vector<std::int64_t>& missing, pid_t parent) {
-    ::signal(SIGINT, SIG_IGN);  // the parent ends it, between two runs
-    ::signal(SIGTERM, SIG_IGN);
-    ::signal(SIGPIPE, SIG_IGN);
-    ReferenceMotions references;
-    try {
-      for (std::size_t at; (at = next_->fetch_add(1)) < missing.size() && getppid() == parent;) {
-        const std::string line = rowOf(plan, scenario, missing[at], references) + "\n";
-        for (std::size_t sent = 0; sent < line.size();) {
-          const ssize_t n = ::write(pipe_[1], line.data() + sent, line.size() - sent);
-          if (n <= 0) _exit(1);  // nobody listens
-          sent += static_cast<std::size_t>(n);
-        }
-      }
-    } catch (const std::exception& error) {
-      fmt::print(stderr, "ves sweep: a worker ended: {}\n", error.what());
-    }
-    _exit(0);
-  }
-
-  std::atomic<std::size_t>* next_;
-  int pipe_[2] = {-1, -1};
-  std::vector<pid_t> children_;
-  std::string buffer_;
-};
-
 /// Refuses a folder in which another sweep was begun; else leaves there what this one is.
 void requireSame(const SweepPlan& plan, const SweepOptions& options) {
   std::vector<std::string> all = options.overrides;
@@ -303,21 +219,22 @@ SweepResult sweep(const SweepPlan& plan, const SweepOptions& options,
     std::ofstream out(part, std::ios::binary | std::ios::app);
     Value scenario = loadDocument(options.scenario);
     for (const std::string& one : options.overrides) applyOverride(scenario, one);
-    Workers workers(plan, scenario, options.workers, missing, lock);
-    while (!stop()) {
-      const std::string row = workers.row();
-      if (row.empty()) {
-        if (progress.done < progress.of)
-          throw InputError("--workers: they ended before their work did");
-        break;
-      }
-      out << row << '\n' << std::flush;
-      if (!out) throw InputError(part.string() + ": cannot be written");
-      ++progress.done;
-      ++progress.run_now;
-      progress.elapsed = static_cast<double>(monotonicNow() - start) * kSecondPerNanosecond;
-      if (shown) shown(progress);
-    }
+    ReferenceMotions references;
+    std::mutex writing;
+    tbb::task_arena workers(options.workers);
+    workers.execute([&] {
+      tbb::parallel_for_each(missing, [&](std::int64_t run) {
+        if (stop()) return;
+        const std::string row = rowOf(plan, scenario, run, references);
+        const std::lock_guard lock_rows(writing);
+        out << row << '\n' << std::flush;
+        if (!out) throw InputError(part.string() + ": cannot be written");
+        ++progress.done;
+        ++progress.run_now;
+        progress.elapsed = static_cast<double>(monotonicNow() - start) * kSecondPerNanosecond;
+        if (shown) shown(progress);
+      });
+    });
   }
 
   // In order, and of all ranks when the others are done too.

@@ -25,7 +25,7 @@ ServoRecord readServo(Section section);
 
 /// `nominal` with what the record has found.
 ServoModel withRecord(ServoModel nominal, const ServoRecord& record);
-/// What the belief may be wrong by: at least three of the record's deviations.
+/// What the belief may be wrong by: three of the record's deviations; with adaptation at least.
 Compensation withRecord(Compensation nominal, const ServoRecord& record);
 
 }  // namespace ves

@@ -56,12 +56,11 @@ class AdmittanceControl {
   Oscillation oscillation_;
   PortWork port_;
   EnergyAccount energy_;
-  double period_;        // [s]
-  double joint_moves_;   // [rad | m] what counts as a motion of the robot
-  double growth_floor_;  // [J]
-  Braking braking_;      // before the limits
-  double slow_;          // [m/s] no leg of such a speed is too fast
-  double reach_ = 0.0;   // [m] of a leg's joint per rate of the fixed angles, at most
+  double period_;       // [s]
+  double joint_moves_;  // [rad | m] what counts as a motion of the robot
+  Braking braking_;     // before the limits
+  double slow_;         // [m/s] no leg of such a speed is too fast
+  double reach_ = 0.0;  // [m] of a leg's joint per rate of the fixed angles, at most
   double scale_ = 1.0;
 };
 

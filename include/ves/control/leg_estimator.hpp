@@ -48,8 +48,8 @@ class LegEstimator {
 
   Geometry geometry_;
   LegCodec codec_;
-  double period_;        // [s]
-  double reading_jump_;  // [m] of a leg at rest, from one sample to the next
+  double period_;  // [s]
+  SafetyLimits limits_;
   bool feels_, adapts_;
   ServoObserver servo_;
   ServoAdaptation adaptation_;

@@ -7,12 +7,11 @@
 
 namespace ves {
 
-/// The speed [m/s] that each leg has had lately: rises at once, falls away over kMemory.
+/// The speed [m/s] that each leg has had lately: rises at once, falls away over `memory` [s].
 class LegSpeed {
  public:
-  static constexpr double kMemory = 0.3;  // [s]
-  void step(const Vec6& L_dot, double period) noexcept {
-    speed_ = L_dot.cwiseAbs().cwiseMax(speed_ * (1.0 - period / kMemory));
+  void step(const Vec6& L_dot, double period, double memory) noexcept {
+    speed_ = L_dot.cwiseAbs().cwiseMax(speed_ * (1.0 - period / memory));
   }
   const Vec6& speed() const noexcept { return speed_; }
 
@@ -21,18 +20,17 @@ class LegSpeed {
 };
 
 /// Readings of the legs: one that no leg can have reached since the last is rejected; the one
-/// before is kept. Twice in a row is a fault.
+/// before is kept. More than reading_patience in a row are a fault.
 class LegReadings {
  public:
-  static constexpr int kPatience = 1;  // [-] readings in a row that may be wrong
-
   /// `speed` is what the legs were told lately, `time` [s] has passed since the last reading.
   /// Returns the accepted lengths.
-  const Vec6& take(const Vec6& L, const Vec6& speed, double time, double jump) noexcept;
+  const Vec6& take(const SafetyLimits& limits, const Vec6& L, const Vec6& speed,
+                   double time) noexcept;
   /// Accepts whatever comes next: the legs did not follow our commands.
   void reset() noexcept { known_ = false; }
 
-  bool good() const noexcept { return wrong_ <= kPatience; }
+  bool good(const SafetyLimits& limits) const noexcept { return wrong_ <= limits.reading_patience; }
 
  private:
   bool known_ = false;
@@ -78,13 +76,10 @@ class Overruns {
 /// (Appendix E), and then it grows window after window, or goes on swinging against the envelope.
 class Oscillation {
  public:
-  static constexpr double kWindow = 0.5;  // [s]
-  static constexpr double kGrowth = 1.2;  // [-] of a window over the last
-
   /// `energy` [J]; `held`: the envelope slows a motion; `q` the robot's joints, `moved` [rad | m]
   /// what counts as moving.
-  void take(double energy, bool held, const JointVector& q, double moved, double period,
-            double floor) noexcept;
+  void take(const SafetyLimits& limits, double energy, bool held, const JointVector& q,
+            double moved, double period) noexcept;
   void reset() noexcept { *this = Oscillation(); }
   bool good(const SafetyLimits& limits) const noexcept { return grown_ < limits.growing_windows; }
 

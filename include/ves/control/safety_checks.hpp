@@ -17,7 +17,10 @@ struct SafetyLimits {
   double position_error = 0.0;        // [m] commanded minus measured length, at most
   double position_error_still = 0.0;  // [m] the same, of a leg at rest
   double position_error_lag = 0.0;    // [s] and so much more per speed of the leg
-  double reading_jump = 0.0;          // [m] of a leg at rest, from one sample to the next
+  double reading_jump = 0.0;          // [m] of a leg at rest, from one sample to the next,
+  double reading_speed = 1.0;         // [-] and so much more, times the speed it had lately;
+  double speed_memory = 1.0;          // [s] over which that speed is forgotten
+  int reading_patience = 0;           // [-] readings in a row that may be impossible
   double translation = 0.0;           // [m] of each coordinate from home
   double rotation = 0.0;              // [rad] of each coordinate from home
   double leg_min = 0.0;               // [m]
@@ -38,7 +41,10 @@ struct SafetyLimits {
   int frozen_samples = 0;             // [-] with six identical readings
   double frozen_counts = 0.0;         // [count] by which the weight should have changed one of them
   int growing_windows = 0;            // [-] in a row, each with more energy than the last
+  double window = 1.0;                // [s] of these,
+  double window_growth = 1.0;         // [-] more than this is growth,
   double growth_floor = 0.0;          // [J] below which nothing is said
+  double tool_singularity = 0.0;  // [-] of the simulated robot, where its tool paths are refused
   double start_force = 0.0;   // [N] measured, gravity compensated, when admittance control begins
   double start_moment = 0.0;  // [N m]
 };

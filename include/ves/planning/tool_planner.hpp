@@ -32,15 +32,13 @@ class ToolPlanner {
  public:
   /// The share of a path's duration in which its speed rises, and falls again: a trapezoid.
   static constexpr double kRamp = 0.25;  // [-]
-  /// Least over largest singular value of the Jacobian, lengths by the arm's reach, below which a
-  /// pose counts as singular: joints would move a hundred times as much as the tool.
-  static constexpr double kSingular = 0.01;  // [-]
 
   /// `link` [-] carries the tool, -1: link 0; `fastest` [rad/s | m/s] of each joint, infinite where
-  /// nobody knows; `names` of the joints, for messages. Throws InputError when the tool is carried
-  /// by no joint, or by one that follows another.
+  /// nobody knows; `names` of the joints, for messages. A pose is singular where the least singular
+  /// value of the Jacobian, lengths by the arm's reach, is below so many times the largest. Throws
+  /// InputError when the tool is carried by no joint, or by one that follows another.
   ToolPlanner(const RobotModel& robot, int link, const Transform& X_LinkT,
-              const JointVector& fastest, const std::vector<std::string>& names);
+              const JointVector& fastest, const std::vector<std::string>& names, double singular);
   ~ToolPlanner();
   ToolPlanner(const ToolPlanner&) = delete;
   ToolPlanner& operator=(const ToolPlanner&) = delete;

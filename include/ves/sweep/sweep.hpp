@@ -52,7 +52,7 @@ struct SweepOptions {
   std::filesystem::path scenario;
   std::vector<std::string> overrides;  // of every run
   std::filesystem::path file;          // CSV; what it has already is not run again
-  int workers = 1;                     // [-] processes
+  int workers = 1;                     // [-] runs at a time
   int rank = 0, ranks = 1;             // [-] of several sweeps that share the runs and a folder
 };
 
@@ -68,7 +68,8 @@ struct SweepResult {
   bool complete = false;      // the file has all runs, in order
 };
 
-/// Runs what is missing. `stop` is looked at after every row. Throws InputError.
+/// Runs what is missing. `stop` is looked at before every run; it and `shown` may be called
+/// by any thread, `shown` by one at a time. Throws InputError.
 SweepResult sweep(const SweepPlan& plan, const SweepOptions& options,
                   const std::function<void(const SweepProgress&)>& shown,
                   const std::function<bool()>& stop);
