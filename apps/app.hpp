@@ -20,7 +20,7 @@
 #include <thread>
 #include <vector>
 
-#include "ves/analysis/contact.hpp"
+#include "ves/analysis/leaning.hpp"
 #include "ves/config/experiment.hpp"
 #include "ves/run/run.hpp"
 

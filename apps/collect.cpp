@@ -8,9 +8,9 @@
 #include "app.hpp"
 #include "commands.hpp"
 #include "ves/bus/channels.hpp"
-#include "ves/results/series.hpp"
+#include "ves/series/series.hpp"
 #include "ves/run/follow_bus.hpp"
-#include "ves/view/ros2.hpp"
+#include "ves/export/ros2.hpp"
 
 namespace ves::app {
 

@@ -6,7 +6,7 @@
 #include "app.hpp"
 #include "commands.hpp"
 #include "ves/core/coordinates.hpp"
-#include "ves/results/differences.hpp"
+#include "ves/evaluation/differences.hpp"
 #include "ves/validation/page.hpp"
 
 namespace ves::app {

@@ -7,7 +7,7 @@
 #include "commands.hpp"
 #include "runner.hpp"
 #include "ves/doctor/doctor.hpp"
-#include "ves/results/summary.hpp"
+#include "ves/evaluation/summary.hpp"
 #include "ves/run/process.hpp"
 
 namespace ves::app {

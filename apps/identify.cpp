@@ -10,8 +10,8 @@
 #include "ves/identification/scenario.hpp"
 #include "ves/identification/sensor_timing.hpp"
 #include "ves/identification/servo_identification.hpp"
-#include "ves/results/static_intervals.hpp"
-#include "ves/run/iterative_compensation.hpp"
+#include "ves/evaluation/static_intervals.hpp"
+#include "ves/validation/iterative_compensation.hpp"
 
 namespace ves::app {
 namespace {

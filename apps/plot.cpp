@@ -5,8 +5,8 @@
 
 #include "app.hpp"
 #include "commands.hpp"
-#include "ves/results/figure.hpp"
-#include "ves/results/series.hpp"
+#include "ves/pictures/figure.hpp"
+#include "ves/series/series.hpp"
 
 namespace ves::app {
 namespace {

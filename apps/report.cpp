@@ -5,7 +5,7 @@
 
 #include "commands.hpp"
 #include "runner.hpp"
-#include "ves/results/summary.hpp"
+#include "ves/evaluation/summary.hpp"
 #include "ves/validation/chapter4.hpp"
 
 namespace ves::app {

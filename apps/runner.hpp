@@ -11,7 +11,7 @@
 #include "ves/realtime/realtime.hpp"
 #include "ves/results/results.hpp"
 #include "ves/run/process.hpp"
-#include "ves/view/web_server.hpp"
+#include "ves/page/web_server.hpp"
 
 namespace ves::app {
 

@@ -6,10 +6,10 @@
 #include "commands.hpp"
 #include "runner.hpp"
 #include "ves/analysis/appendix_e.hpp"
-#include "ves/analysis/contact.hpp"
+#include "ves/analysis/leaning.hpp"
 #include "ves/analysis/gate.hpp"
 #include "ves/math/dense.hpp"
-#include "ves/results/gnuplot.hpp"
+#include "ves/pictures/gnuplot.hpp"
 
 namespace ves::app {
 namespace {
@@ -75,11 +75,11 @@ struct Parameter {
 const Parameter kParameters[] = {
     {"mass", "robot's inertia, times its own", 0.0, 10000.0,
      [](Loop& l, const Loop& o, double v) {
-       l.robot_P = heavier(v, o.robot_P);
+       l.robot_P = scaledDensity(v, o.robot_P);
        l.model.robot_P = l.robot_P;
      }},
     {"mass_error", "robot's inertia, times the controller's model", 0.0, 100.0,
-     [](Loop& l, const Loop& o, double v) { l.robot_P = heavier(v, o.robot_P); }},
+     [](Loop& l, const Loop& o, double v) { l.robot_P = scaledDensity(v, o.robot_P); }},
     {"contact_stiffness", "stiffness of the contact [N/m]", 1e-3, 1e12,
      [](Loop& l, const Loop&, double v) {
        l.contact->damping *= std::sqrt(v / l.contact->stiffness);

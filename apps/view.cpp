@@ -3,11 +3,11 @@
 // ves view: a run in a browser, as it happens or from its log; or a log as one file.
 #include "app.hpp"
 #include "commands.hpp"
-#include "ves/results/series.hpp"
-#include "ves/view/live_run.hpp"
-#include "ves/view/page.hpp"
-#include "ves/view/scene.hpp"
-#include "ves/view/still.hpp"
+#include "ves/series/series.hpp"
+#include "ves/page/live_run.hpp"
+#include "ves/page/page.hpp"
+#include "ves/page/scene.hpp"
+#include "ves/page/still.hpp"
 
 namespace ves::app {
 namespace {

@@ -17,7 +17,7 @@
 #include "ves/control/gravity_compensation.hpp"
 #include "ves/core/build.hpp"
 #include "ves/math/second_order.hpp"
-#include "ves/results/series.hpp"
+#include "ves/series/series.hpp"
 #include "ves/robot/newton_euler.hpp"
 #include "ves/srms/interaction.hpp"
 #include "ves/srms/modes.hpp"

@@ -11,7 +11,7 @@
 #include "ves/analysis/gate.hpp"
 #include "ves/analysis/loop.hpp"
 #include "ves/math/dense.hpp"
-#include "ves/results/comparison.hpp"
+#include "ves/evaluation/comparison.hpp"
 #include "ves/run/run.hpp"
 #include "ves/srms/modes.hpp"
 

@@ -13,9 +13,9 @@
 
 #include "support/rig.hpp"
 #include "ves/run/announcer.hpp"
-#include "ves/results/series.hpp"
-#include "ves/results/summary.hpp"
-#include "ves/results/tool_motion.hpp"
+#include "ves/series/series.hpp"
+#include "ves/evaluation/summary.hpp"
+#include "ves/evaluation/tool_motion.hpp"
 #include "ves/run/run.hpp"
 
 namespace ves {

@@ -16,7 +16,7 @@
 #include "ves/identification/sensor_timing.hpp"
 #include "ves/identification/servo_identification.hpp"
 #include "ves/math/dense.hpp"
-#include "ves/results/comparison.hpp"
+#include "ves/evaluation/comparison.hpp"
 #include "ves/run/run.hpp"
 
 namespace ves {

@@ -11,7 +11,7 @@
 #include "ves/console/command.hpp"
 #include "ves/console/form.hpp"
 #include "ves/realtime/realtime.hpp"
-#include "ves/run/bus_observer.hpp"
+#include "ves/faults/bus_observer.hpp"
 
 namespace ves {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "support/refusal.hpp"
 #include "support/rig.hpp"
-#include "ves/analysis/contact.hpp"
+#include "ves/analysis/leaning.hpp"
 #include "ves/analysis/gate.hpp"
 #include "ves/math/dense.hpp"
 #include "ves/srms/interaction.hpp"

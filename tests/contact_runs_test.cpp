@@ -8,8 +8,8 @@
 #include "ves/bus/messages.hpp"
 #include "ves/config/experiment.hpp"
 #include "ves/plant/plant.hpp"
-#include "ves/results/contacts.hpp"
-#include "ves/results/summary.hpp"
+#include "ves/evaluation/contact_pairs.hpp"
+#include "ves/evaluation/summary.hpp"
 #include "ves/run/truth.hpp"
 #include "ves/srms/interaction.hpp"
 

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "support/rig.hpp"
-#include "ves/results/differences.hpp"
+#include "ves/evaluation/differences.hpp"
 
 namespace ves {
 namespace {

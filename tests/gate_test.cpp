@@ -163,7 +163,7 @@ TEST(Gate, ALoadThatNobodyToldOfIsNotCompensated) {
   Experiment e = test::experiment("srms_deploy_doss", {"controller.compensation.observer=true",
                                                        "controller.compensation.inertia=true"});
   const Loop loop = loopOf(e.controller, e.plant.task.initial_joints, Direction::kExtending);
-  const RigidBody light = loop.robot_P, heavy = heavier(3.0, light);
+  const RigidBody light = loop.robot_P, heavy = scaledDensity(3.0, light);
   Loop untold = loop;
   untold.robot_P = heavy;
   Loop told = untold;

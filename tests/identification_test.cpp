@@ -14,7 +14,7 @@
 #include "ves/control/gravity_compensation.hpp"
 #include "ves/identification/scenario.hpp"
 #include "ves/plant/force_torque_sensor.hpp"
-#include "ves/run/iterative_compensation.hpp"
+#include "ves/validation/iterative_compensation.hpp"
 
 namespace ves {
 namespace {

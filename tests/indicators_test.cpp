@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "ves/results/indicators.hpp"
+#include "ves/evaluation/indicators.hpp"
 
 namespace ves {
 namespace {

@@ -15,7 +15,7 @@
 #include "support/rig.hpp"
 #include "ves/bus/channels.hpp"
 #include "ves/bus/event_log.hpp"
-#include "ves/results/series.hpp"
+#include "ves/series/series.hpp"
 #include "ves/run/run.hpp"
 
 namespace ves {

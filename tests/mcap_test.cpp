@@ -12,8 +12,8 @@
 #include <iterator>
 
 #include "support/refusal.hpp"
-#include "ves/view/lcm_definition.hpp"
-#include "ves/view/mcap.hpp"
+#include "ves/export/lcm_definition.hpp"
+#include "ves/export/mcap.hpp"
 
 namespace ves {
 namespace {

@@ -15,8 +15,8 @@
 #include "ves/bus/bus.hpp"
 #include "ves/bus/channels.hpp"
 #include "ves/bus/fields.hpp"
-#include "ves/results/series.hpp"
-#include "ves/view/lcm_definition.hpp"
+#include "ves/series/series.hpp"
+#include "ves/export/lcm_definition.hpp"
 
 namespace ves {
 namespace {

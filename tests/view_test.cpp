@@ -16,13 +16,13 @@
 #include "support/rig.hpp"
 #include "support/robots.hpp"
 #include "ves/bus/channels.hpp"
-#include "ves/results/marks.hpp"
-#include "ves/results/tool_motion.hpp"
-#include "ves/view/live_run.hpp"
-#include "ves/view/page.hpp"
-#include "ves/view/scene.hpp"
-#include "ves/view/still.hpp"
-#include "ves/view/web_server.hpp"
+#include "ves/pictures/marks.hpp"
+#include "ves/evaluation/tool_motion.hpp"
+#include "ves/page/live_run.hpp"
+#include "ves/page/page.hpp"
+#include "ves/page/scene.hpp"
+#include "ves/page/still.hpp"
+#include "ves/page/web_server.hpp"
 
 namespace ves {
 namespace {

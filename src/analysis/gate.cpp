@@ -9,7 +9,7 @@
 #include <optional>
 #include <set>
 
-#include "ves/analysis/contact.hpp"
+#include "ves/analysis/leaning.hpp"
 #include "ves/core/coordinates.hpp"
 
 namespace ves {
@@ -109,8 +109,8 @@ std::optional<std::array<int, 3>> cornerThatGrows(const ControllerConfig& contro
   if (!c.inertia) return {};
   const Uncertainty by = uncertaintyOf(c);
   std::vector<CarriedRobot> heavy = robots, both = robots;
-  for (CarriedRobot& robot : heavy) robot.robot_P = heavier(1.0 + by.mass, robot.robot_P);
-  for (CarriedRobot& robot : both) robot.robot_P = heavier(1.0 - by.mass, robot.robot_P);
+  for (CarriedRobot& robot : heavy) robot.robot_P = scaledDensity(1.0 + by.mass, robot.robot_P);
+  for (CarriedRobot& robot : both) robot.robot_P = scaledDensity(1.0 - by.mass, robot.robot_P);
   both.insert(both.end(), heavy.begin(), heavy.end());
   for (const int gain : {1, -1})
     for (const int timing : {1, -1}) {
@@ -184,7 +184,7 @@ LoopVerdict assessStability(const ControllerConfig& controller, const RobotTask&
       const auto& [timing, gain, mass] = out.off;
       for (const Direction direction : kBoth)
         for (CarriedRobot robot : robots) {
-          robot.robot_P = heavier(1.0 + mass * out.uncertainty.mass, robot.robot_P);
+          robot.robot_P = scaledDensity(1.0 + mass * out.uncertainty.mass, robot.robot_P);
           const DominantRoot root =
               dominantRoot(off(carrying(loopOf(controller, task.initial_joints, direction), robot),
                                out.uncertainty, timing, gain));

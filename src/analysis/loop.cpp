@@ -268,7 +268,7 @@ Margins margins(const Loop& loop) {
   };
   out.gain = factor([&](double times) {
     Loop some = loop;
-    some.robot_P = heavier(times, some.robot_P);
+    some.robot_P = scaledDensity(times, some.robot_P);
     return decays(some, lifted);
   });
   out.servo_gain = factor([&](double times) {

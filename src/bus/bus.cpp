@@ -420,8 +420,8 @@ bool PlantLink::mayCommand(const header_t& from, std::int64_t machine, bool enga
     sequence_ = -2;
   }
   if (from.sequence < sequence_ || !means(machine)) return false;
-  // Only lockstep says a command twice, and has no key: here it is a recording, and keeps no
-  // watchdog from its work.
+  // Only lockstep repeats a command, and has no key: with a key a repeated one is a recording, and
+  // must not feed the watchdog.
   if (bus_.keyed() && from.sequence == sequence_ && from.sequence >= 0) return false;
   last_heard_ = {from.source, from.sequence, bus_.arrival()};
   sequence_ = from.sequence;

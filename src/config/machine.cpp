@@ -114,7 +114,7 @@ void readPlantMismatch(Section s, plant::PlantConfig& p) {
   const double mass = s.has("mass") ? s.number("mass", 0.01, 100.0) : 1.0;
   const double center = s.has("center") ? s.number("center", 0.0, 10.0) : 1.0;
   const auto change = [&](RigidBody& body) {
-    body = heavier(mass, body);
+    body = scaledDensity(mass, body);
     body.p_BoBcm_B *= center;
   };
   change(p.payload.robot.base);

@@ -8,7 +8,7 @@
 #include <fstream>
 
 #include "ves/console/command.hpp"
-#include "ves/results/series.hpp"
+#include "ves/series/series.hpp"
 
 namespace ves {
 

@@ -16,8 +16,8 @@
 #include "ves/console/form.hpp"
 #include "ves/core/coordinates.hpp"
 #include "ves/realtime/realtime.hpp"
-#include "ves/results/evidence.hpp"
-#include "ves/results/series.hpp"
+#include "ves/evaluation/evidence.hpp"
+#include "ves/series/series.hpp"
 #include "ves/run/session.hpp"
 
 namespace ves {
@@ -117,7 +117,7 @@ class Console {
       if (status == CalibrationStatus::kDone) keepCalibration(s);
       if (status == CalibrationStatus::kRefused) {
         failed_ = failed_ || !script_.empty();
-        say(fmt::format("calibration refused: {}; the bias is as before", stirred(s, experiment_)));
+        say(fmt::format("calibration refused: {}; the bias is as before", stillnessViolation(s, experiment_)));
       }
     }
   }

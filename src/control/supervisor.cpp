@@ -4,7 +4,7 @@
 namespace ves {
 namespace {
 
-/// More is wrong than that the stream of samples has not begun.
+/// A check fails other than the two that fail until the stream of samples has begun.
 bool forbids(Tripped tripped) {
   Tripped waiting;
   waiting.require(Check::kStale, false);
@@ -168,7 +168,7 @@ Refusal Supervisor::refusesAdmittance(const Segment& segment, const Situation& n
 void Supervisor::advance(const Situation& now, Actuation act) noexcept {
   switch (phase_) {
     case Phase::kDisarmed:
-      // A request does not outlive a cause: releasing a button must move nothing.
+      // A failing check cancels a pending request: releasing a button must move nothing.
       if (forbids(tripped_)) pending_request_ = Request::kNone;
       if (pending_request_ != Request::kNone && now.fresh_ticks > now.config.arming_samples &&
           !tripped_.any())

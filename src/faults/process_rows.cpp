@@ -9,7 +9,7 @@
 
 #include "rows.hpp"
 #include "ves/bus/channels.hpp"
-#include "ves/run/bus_observer.hpp"
+#include "ves/faults/bus_observer.hpp"
 #include "ves/run/process.hpp"
 
 namespace ves {

@@ -10,10 +10,10 @@
 #include <cstring>
 
 #include "ves/realtime/realtime.hpp"
-#include "ves/results/contacts.hpp"
-#include "ves/results/plots.hpp"
-#include "ves/results/summary.hpp"
-#include "ves/results/tool_motion.hpp"
+#include "ves/evaluation/contact_pairs.hpp"
+#include "ves/pictures/plots.hpp"
+#include "ves/evaluation/summary.hpp"
+#include "ves/evaluation/tool_motion.hpp"
 
 namespace ves {
 

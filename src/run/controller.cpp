@@ -18,7 +18,7 @@ constexpr int kAnswerTime = 200;         // [ms] lockstep, before a message is r
 constexpr int kAnswerTries = 50;         // [-] before the other side counts as gone
 constexpr std::int64_t kFirstSampleTime = 10'000'000'000;  // [ns]
 constexpr std::int64_t kHello = 100'000'000;               // [ns] between two of them
-constexpr std::int64_t kWorthAWord = 2'000'000'000;        // [ns]
+constexpr std::int64_t kWarnAfter = 2'000'000'000;        // [ns]
 
 /// Counts the times of this tick into the histograms.
 void count(timing_t& t) noexcept {
@@ -140,7 +140,7 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
   std::int64_t hello = 0;  // [ns] the last
   for (bool told = false; link.sample().sequence < 0;) {
     if (wantsOut()) return letGo();
-    if (!told && monotonicNow() - start > kWorthAWord) {
+    if (!told && monotonicNow() - start > kWarnAfter) {
       told = true;
       fmt::print(stderr, "controller: waiting for a machine on {}\n", options.url);
     }

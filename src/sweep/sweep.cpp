@@ -18,7 +18,7 @@
 #include <mutex>
 
 #include "ves/realtime/realtime.hpp"
-#include "ves/results/summary.hpp"
+#include "ves/evaluation/summary.hpp"
 
 namespace ves {
 namespace {

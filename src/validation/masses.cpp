@@ -6,7 +6,7 @@
 
 #include "ves/identification/pose_plan.hpp"
 #include "ves/identification/scenario.hpp"
-#include "ves/results/static_intervals.hpp"
+#include "ves/evaluation/static_intervals.hpp"
 
 namespace ves {
 

@@ -13,8 +13,8 @@
 #include <set>
 
 #include "ves/core/coordinates.hpp"
-#include "ves/results/comparison.hpp"
-#include "ves/results/summary.hpp"
+#include "ves/evaluation/comparison.hpp"
+#include "ves/evaluation/summary.hpp"
 #include "ves/validation/chapter4.hpp"
 #include "ves/validation/claims.hpp"
 #include "ves/validation/page.hpp"

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "ves/results/drift_samples.hpp"
+#include "ves/evaluation/drift_samples.hpp"
 
 namespace ves {
 namespace {

@@ -4,7 +4,7 @@
 
 #include "reproduction.hpp"
 #include "ves/analysis/loop.hpp"
-#include "ves/view/still.hpp"
+#include "ves/page/still.hpp"
 
 namespace ves {
 namespace {

@@ -9,7 +9,7 @@
 #include <string>
 
 #include "bytes.hpp"
-#include "ves/view/web_server.hpp"
+#include "ves/page/web_server.hpp"
 
 namespace {
 

@@ -19,10 +19,10 @@
 
 #include "machines.hpp"
 #include "support/rig.hpp"
-#include "ves/analysis/contact.hpp"
+#include "ves/analysis/leaning.hpp"
 #include "ves/analysis/gate.hpp"
 #include "ves/math/dense.hpp"
-#include "ves/results/contacts.hpp"
+#include "ves/evaluation/contact_pairs.hpp"
 
 namespace ves {
 namespace {

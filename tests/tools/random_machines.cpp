@@ -21,7 +21,7 @@
 #include "machines.hpp"
 #include "support/rig.hpp"
 #include "ves/analysis/gate.hpp"
-#include "ves/results/comparison.hpp"
+#include "ves/evaluation/comparison.hpp"
 #include "ves/run/truth.hpp"
 
 namespace ves {

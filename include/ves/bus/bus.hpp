@@ -100,8 +100,8 @@ class Bus {
   int descriptor() const noexcept { return wire_->descriptor(); }
   /// Waits for one message; false when none came in time, or a signal did.
   bool wait(int milliseconds) noexcept;
-  /// The same, for an answer that may come within microseconds: awake for the first 50, where there
-  /// are several processors. To fall asleep and be woken takes longer.
+  /// The same, for an answer that may come within microseconds: where there are several processors
+  /// it busy-waits for 50 us first, because falling asleep and being woken takes longer.
   bool waitAwake(int milliseconds) noexcept;
 
   /// [ns] monotonic, when the message that a handler has in hand came to this host.

@@ -108,9 +108,9 @@ class AdmittanceModel {
   /// Discretises for the period [s].
   AdmittanceModel(const ModalModel& model, double period);
 
-  /// At rest at x. What the modes cannot express of x stays as a constant offset. It is motion(),
-  /// `ahead` [s] of the modes, that will have started from rest there: they start so much earlier,
-  /// on the motion with M_1 that leads to x, heavy damping left out of it.
+  /// motion() is at rest at x. What the modes cannot express of x stays as a constant offset. Where
+  /// motion() is predicted `ahead` [s] of the modes, these are propagated back by `ahead` along the
+  /// motion with M_1 that leads to x (without heavy damping), so that the prediction starts at rest.
   void reset(const Vec6& x, const Mat6& M_1 = Mat6::Zero(), double ahead = 0.0) noexcept;
 
   /// (C.6): the state one period after W began to act. `damping` [1/s] acts on every mode besides,

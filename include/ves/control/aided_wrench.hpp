@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// The wrench against the sensor's noise: what the robot's joints do is computed from their angles,
-// and of what the sensor shows beyond that only what its noise cannot be is let pass. Beyond the
-// report.
+// The wrench without the sensor's noise: what the robot's joints do is computed from their angles,
+// and of what the sensor shows beyond that only significant residuals pass. Beyond the report.
 #pragma once
 
 #include "ves/control/robot_load.hpp"

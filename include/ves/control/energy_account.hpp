@@ -5,7 +5,7 @@
 //
 // An ideal base takes the work that the robot does on it, F^T x', where the platform is. This one
 // takes F^T x' of its model; the robot, the contact at its tool and what it pushes feel the
-// platform, which is late. What the two differ in, nobody has done: the emulation has put it in.
+// platform, which is late. The difference of the two is energy that the emulation injects.
 //
 // The tank is De Stefano, Balachandran and Secchi's (IEEE T-RO 36(1), 2020): filled to its reserve
 // at most, it is emptied by what is put in, as soon as that is known; below zero the model's modes

@@ -10,8 +10,8 @@
 
 namespace ves {
 
-/// The model of what the sensor carries: as configured, and what the robot has in hand as far as
-/// that is told.
+/// The model of what the sensor carries: as configured, and what the robot has in hand as announced
+/// to the controller.
 class KnownPayload {
  public:
   explicit KnownPayload(const ControllerConfig& config);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // Speed and acceleration of the legs, which nothing measures, and their lengths below a count: the
-// servo model beside the servos, held to the readings.
+// servo model, run beside the servos and corrected by the readings.
 #pragma once
 
 #include "ves/control/modelled_servos.hpp"

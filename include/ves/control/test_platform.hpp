@@ -41,7 +41,7 @@ class TestPlatform {
     Wrench total;          // measured
     Wrench static_wrench;  // of gravity
     Wrench inertial;       // of the robot's composite body, when that is compensated
-    Wrench dynamic;        // total - static_wrench + inertial, less what passes for noise
+    Wrench dynamic;        // total - static_wrench + inertial, minus the residual that is classified as noise
   };
   Waypoint<6> nextMotion(const Wrench& dynamic) noexcept;
   Checked safetyChecks(const Proposal& next, const Wrench& dynamic, bool conflict) const noexcept;

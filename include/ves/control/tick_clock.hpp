@@ -52,8 +52,8 @@ class SampleStream {
  public:
   explicit SampleStream(std::int64_t period) : period_(period) {}  // [ns]
 
-  /// An older sample than the last is none, while the legs are ours; before that, a machine may
-  /// begin anew. One whose clock stands still is not new either. `now` [ns]: of the machine's
+  /// While the legs follow, a sample with a lower sequence than the last is ignored; before that, a
+  /// machine may start over. A sample with an unchanged time is not new. `now` [ns] of the machine's
   /// clock.
   void update(const Sample& newest, std::int64_t now, bool engaged, bool conflict) noexcept {
     const Sample before = sample_;

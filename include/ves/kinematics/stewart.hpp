@@ -73,8 +73,8 @@ inline constexpr int kForwardIterations = 20;
 ForwardSolution forwardPose(const Geometry& geometry, const Vec6& L,
                             const Transform& guess) noexcept;
 
-/// The Jacobian of one pose, factorised. From look to look a platform hardly moves, and what was
-/// factorised at the last pose does for the next.
+/// The Jacobian of one pose, factorised. Consecutive poses are close, so that the factors of the
+/// last pose serve for the next.
 struct JacobianFactors {
   Eigen::PartialPivLU<Mat6> lu;  // of half the derivative of (2.22) with respect to the twist
   bool known = false;

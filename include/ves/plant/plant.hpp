@@ -3,13 +3,12 @@
 // Everything that was metal, on one event schedule:
 //
 //   every 341 us   six Temposonics readings into six LegSlaves
-//   every 1023 us  new valve currents (a LegSlave's second reading), and half a period later, in
-//   the
-//                  middle of the constant current, one step of the mechanics: forward kinematics,
-//                  Newton-Euler on the moving base, force-torque sensor
-//   when asked     a sample, at that very moment; or, where the A/D converter averages, its
-//   readings
-//                  over the last controller period, in the middles of its equal parts
+//   every 1023 us  new valve currents (a LegSlave's second reading)
+//                  half a period later, in the middle of the constant current, one step of the
+//                  mechanics: forward kinematics, Newton-Euler on the moving base, sensor
+//   when asked     a sample of that moment
+//                  where the A/D converter averages, of its readings over the last controller
+//                  period, in the middles of equal parts
 //
 // The periods are no multiples of each other. Between events the actuators are integrated exactly.
 #pragma once

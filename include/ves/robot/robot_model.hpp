@@ -40,7 +40,7 @@ inline Mat3 inertiaOf(const Vec6& i) {
 RigidBody combine(const RigidBody& a_A, const Transform& X_AB, const RigidBody& b_B) noexcept;
 
 /// The same body of so many times the density.
-inline RigidBody heavier(double times, const RigidBody& body) noexcept {
+inline RigidBody scaledDensity(double times, const RigidBody& body) noexcept {
   return {times * body.mass, body.p_BoBcm_B, times * body.I_Bcm_B};
 }
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "ves/results/figure.hpp"
+#include "ves/pictures/figure.hpp"
 #include "ves/validation/claims.hpp"
 
 namespace ves {

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/evaluation/evidence.hpp"
+
+#include <fmt/format.h>
+
+#include "ves/analysis/platform.hpp"
+#include "ves/core/coordinates.hpp"
+
+namespace ves {
+namespace {
+
+std::string legOutside(const Row& row, const SafetyLimits& limits) {
+  for (int i = 0; i < kLegs; ++i) {
+    const double L = row.state.leg[i];
+    if (L >= limits.leg_min && L <= limits.leg_max) continue;
+    return fmt::format("leg {} at {:.4f} m, want [{}, {}] (safety.leg_min_m, leg_max_m)", i + 1, L,
+                       limits.leg_min, limits.leg_max);
+  }
+  return {};
+}
+
+std::string coordinateOutside(const Row& row, const SafetyLimits& limits) {
+  for (int i = 0; i < 6; ++i) {
+    const double most = i < 3 ? limits.translation : limits.rotation, x = row.state.x[i];
+    if (std::abs(x) <= most) continue;
+    const Coordinate& c = coordinate(i);
+    return fmt::format("{} at {:.1f} {}, want at most {:.1f} (safety.{})", c.name, x * c.shown,
+                       c.shown_unit, most * c.shown, i < 3 ? "translation_m" : "rotation_deg");
+  }
+  return {};
+}
+
+/// The two legs that are nearest, and the leg that lies flattest on a plate.
+std::string legsTooClose(const Row& row, const Experiment& e) {
+  const Geometry& g = e.controller.geometry;
+  const SafetyLimits& limits = e.controller.safety;
+  const Transform X_IP = g.fromHome(Pose::from(Vec6::Map(row.state.x)));
+  const LegGap gap = nearestLegs(g, X_IP);
+  if (!(gap.distance >= limits.leg_clearance))
+    return fmt::format("legs {} and {} are {:.1f} mm apart, want {:.1f} (safety.leg_clearance_m)",
+                       gap.first + 1, gap.second + 1, gap.distance * 1e3,
+                       limits.leg_clearance * 1e3);
+  const LegSlope slope = flattestLeg(g, X_IP);
+  return fmt::format("leg {} is {:.1f} deg from a plate, want {:.1f} (safety.plate_angle_deg)",
+                     slope.leg + 1, slope.angle / kDegree, limits.plate_angle / kDegree);
+}
+
+std::string legBehind(const Row& row, const SafetyLimits& limits) {
+  int worst = 0;
+  double most = -1.0;
+  for (int i = 0; i < kLegs; ++i)
+    if (const double off = std::abs(row.state.leg[i] - row.state.leg_measured[i]); off > most)
+      most = off, worst = i;
+  return fmt::format(
+      "leg {} is {:.1f} mm from its command (safety.position_error_still_m {:.1f} mm, more with "
+      "speed, at most {:.1f})",
+      worst + 1, most * 1e3, limits.position_error_still * 1e3, limits.position_error * 1e3);
+}
+
+std::string pressure(const Row& row, const Experiment& e) {
+  const double volts = e.plant.sensor.volts_per_count;
+  return fmt::format("{:.2f} V, want [{:.2f}, {:.2f}] (safety.pressure_min_v, pressure_max_v)",
+                     row.sample.adc[kWrenchChannels] * volts,
+                     e.controller.safety.pressure_min * volts,
+                     e.controller.safety.pressure_max * volts);
+}
+
+std::string saturated(const Row& row) {
+  for (int i = 0; i < kWrenchChannels; ++i)
+    if (row.sample.adc[i] <= -32768 || row.sample.adc[i] >= 32767)
+      return fmt::format("channel {} at {} counts: choose a smaller gain (sensor.gain)",
+                         wrenchComponent(i).name, row.sample.adc[i]);
+  return {};
+}
+
+}  // namespace
+
+std::string evidence(Check check, const Row& row, const Experiment& e) {
+  const SafetyLimits& limits = e.controller.safety;
+  switch (check) {
+    case Check::kActuatorLimits: return legOutside(row, limits);
+    case Check::kMotionLimits: return coordinateOutside(row, limits);
+    case Check::kCollide: return legsTooClose(row, e);
+    case Check::kPositionError: return legBehind(row, limits);
+    case Check::kPressure: return row.has_sample ? pressure(row, e) : "";
+    case Check::kSensorSaturated: return row.has_sample ? saturated(row) : "";
+    default: return {};
+  }
+}
+
+std::string stillnessViolation(const state_t& s, const Experiment& experiment) {
+  const auto i = static_cast<std::size_t>(s.violation_index);
+  const StillnessLimits& limits = experiment.controller.stillness;
+  const std::string channel(i < 6 ? kWrenchComponents[i].name : "a channel");
+  switch (static_cast<StillnessViolation>(s.violation)) {
+    case StillnessViolation::kLeg:
+      return fmt::format("leg {} moved by {} counts ({} allowed)", i + 1, s.violation_amount,
+                         limits.leg_counts);
+    case StillnessViolation::kJoint: {
+      const bool known = i < experiment.robot.joint_names.size();
+      const bool turns =
+          known && experiment.controller.payload.robot.jointLink(s.violation_index).type ==
+                       JointType::kRevolute;
+      return fmt::format("{} moved by {:.4f} {} ({} allowed)",
+                         known ? experiment.robot.joint_names[i] : fmt::format("joint {}", i + 1),
+                         s.violation_amount, turns ? "rad" : "m", limits.joint);
+    }
+    case StillnessViolation::kChannel:
+      return fmt::format("{} scatters by {:.1f} counts ({} allowed): something shakes it", channel,
+                         s.violation_amount, limits.deviation);
+    case StillnessViolation::kBias:
+      return fmt::format(
+          "{} would have a bias of {:.0f} counts ({:.0f} allowed): it carries a load that is not "
+          "in the model, or less than that",
+          channel, s.violation_amount, limits.bias);
+    case StillnessViolation::kNone:
+    case StillnessViolation::kCount: break;
+  }
+  return "no stream of new samples";
+}
+
+std::string whyEarly(const Series& series) {
+  const auto stop = std::find_if(series.rows.begin(), series.rows.end(), [](const Row& row) {
+    return row.state.request == static_cast<int>(Request::kStop) &&
+           row.state.phase == static_cast<int>(Phase::kReturning);
+  });
+  if (stop != series.rows.end()) return fmt::format("a stop was requested at {:.2f} s", stop->t);
+  const auto first = std::find_if(series.rows.begin(), series.rows.end(),
+                                  [](const Row& row) { return row.state.aborted != 0; });
+  if (first == series.rows.end()) return {};
+  const state_t& s = first->state;
+  if (s.aborted_by != 0)
+    return fmt::format("a segment of the program was refused: {}",
+                       name(static_cast<Refusal>(s.aborted_by)));
+  return fmt::format("the calibration was refused: {}", stillnessViolation(s, series.experiment));
+}
+
+}  // namespace ves

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/evaluation/tool_motion.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <memory>
+
+#include "ves/core/coordinates.hpp"
+
+namespace ves {
+
+std::optional<ToolMotion> toolMotion(const Series& series, const std::optional<Emulation>& e) {
+  const Experiment& experiment = series.experiment;
+  if (!e || !experiment.robot.tool()) return {};
+  ToolMotion out;
+  const std::map<std::int64_t, Vec6> base = basePoses(series, e->base);
+  const Vec6& start = e->base.x.front();
+  eachTick(series, [&](const Row& row, double) {
+    const auto at = base.find(row.state.header.sequence);
+    if (!row.hasTruePose() || at == base.end()) return;
+    const JointVector q = JointVector::Map(row.truth.q);
+    out.tick.push_back(at->first);
+    out.actual.push_back(toolPose(experiment, Vec6::Map(row.truth.x), q));
+    out.on_base.push_back(toolPose(experiment, at->second, q));
+    out.at_rest.push_back(toolPose(experiment, start, q));
+  });
+  return out;
+}
+
+std::vector<Column> columnsOf(const ToolMotion& motion) {
+  const auto at = std::make_shared<std::map<std::int64_t, Transform>>();  // by tick
+  for (std::size_t k = 0; k < motion.tick.size(); ++k) (*at)[motion.tick[k]] = motion.on_base[k];
+  std::vector<Column> out;
+  for (int i = 0; i < 6; ++i)
+    out.push_back({fmt::format("tool_{}_base_{}", coordinate(i).name, coordinate(i).unit),
+                   [at, i](const Row& row) {
+                     const auto found = at->find(row.state.header.sequence);
+                     return found == at->end() ? NAN : coordinateOf(found->second, i);
+                   },
+                   "of the tool on the simulated base",
+                   {}});
+  return out;
+}
+
+ToolDistance distance(const std::vector<Transform>& a, const std::vector<Transform>& b) {
+  ToolDistance d;
+  const std::size_t n = std::min(a.size(), b.size());
+  for (std::size_t i = 0; i < n; ++i) {
+    const double off = (a[i].p - b[i].p).norm();
+    d.rms += off * off / static_cast<double>(n);
+    d.peak = std::max(d.peak, off);
+  }
+  d.rms = std::sqrt(d.rms);
+  return d;
+}
+
+}  // namespace ves

@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/page/live_run.hpp"
+
+#include <fmt/format.h>
+
+#include <cstring>
+
+#include "ves/bus/channels.hpp"
+#include "ves/realtime/realtime.hpp"
+
+namespace ves {
+namespace {
+
+constexpr std::int64_t kSecond = 1'000'000'000;    // [ns]
+constexpr std::int64_t kStopRepeat = kSecond / 5;  // [ns] without an answer
+constexpr int kStopTimes = 10;                     // [-]
+
+}  // namespace
+
+LiveRun::LiveRun(const std::string& url) : bus_(url) {
+  bus_.subscribe(
+      {channel::kSample, channel::kState, channel::kTruth, channel::kTiming, channel::kExperiment},
+      [this](const std::string& channel, const void* data, std::uint32_t size) {
+        if (channel == channel::kState) {
+          if (const auto m = decode<state_t>(data, size)) takeState(*m);
+        } else if (channel == channel::kExperiment) {
+          if (const auto m = decode<experiment_t>(data, size)) takeExperiment(*m);
+        } else if (channel == channel::kTruth) {
+          if (const auto m = decode<truth_t>(data, size)) rows_.add(*m);
+        } else if (channel == channel::kSample) {
+          if (const auto m = decode<sample_t>(data, size)) rows_.add(*m);
+        } else if (const auto m = decode<timing_t>(data, size)) {
+          if (m->header.source == controller_.source) rows_.add(*m);
+        }
+      });
+}
+
+bool LiveRun::listen() {
+  const std::int64_t newest = newest_, edition = edition_;
+  bus_.drain();
+  remind();
+  return newest_ != newest || edition_ != edition;
+}
+
+/// Whether to show this controller's states. The one with the legs goes before one without, then
+/// the one that began last; one that is silent goes behind all.
+bool LiveRun::follow(const state_t& state) {
+  const Identity from{state.header.source, state.header.epoch};
+  if (from.source == controller_.source && from.epoch == controller_.epoch) return true;
+  const bool shown = state_ && monotonicNow() - heard_ < kSecond;
+  const bool engaged = state.engaged != 0, other = shown && state_->engaged != 0;
+  if (shown && (engaged == other ? from.epoch < controller_.epoch : other)) return false;
+  controller_ = from;
+  state_.reset();
+  rows_ = {};
+  row_.reset();
+  experiment_.reset();
+  scene_.reset();
+  base_.reset();
+  let_go_.reset();
+  stop_.reset();
+  instants_.clear();
+  rate_ = NAN;
+  asked_ = 0;
+  return true;
+}
+
+void LiveRun::takeState(const state_t& state) {
+  if (!follow(state)) return;
+  followBase(state);
+  state_ = state;
+  heard_ = monotonicNow();
+  describe();
+  measureRate(state);
+  if (stop_ && state.order_source == self_.source && state.order_sequence == stop_->sequence)
+    stop_->taken = true;
+  const auto row = rows_.add(state);
+  if (!row || !scene_) return;
+  row_ = *row;
+  // Who joins late has the same time.
+  row_->t = static_cast<double>(row_->state.header.sequence * experiment_->controller.period) *
+            kSecondPerNanosecond;
+  ++newest_;
+}
+
+void LiveRun::takeExperiment(const experiment_t& experiment) {
+  if (!described_ || experiment.header.epoch >= described_->header.epoch) described_ = experiment;
+  describe();
+}
+
+/// The scene, once configuration and controller are known.
+void LiveRun::describe() {
+  if (scene_ || !described_ || described_->header.source != controller_.source) return;
+  try {
+    experiment_ = parseExperiment(described_->resolved, channel::kExperiment);
+    scene_.emplace(*experiment_);
+  } catch (const InputError& error) {
+    if (!std::exchange(warned_, true)) fmt::print(stderr, "ves view: {}\n", error.what());
+    experiment_.reset();
+    described_.reset();
+    return;
+  }
+  for (const std::string& warning : scene_->warnings())
+    fmt::print(stderr, "warning: {}\n", warning);
+  ++edition_;
+  nlohmann::ordered_json text;
+  text["edition"] = edition_;
+  text["width"] = scene_->width() + 2;
+  text["scene"] = scene_->description();
+  text["scene"]["scalars"].push_back("real_time_factor");
+  text["scene"]["scalars"].push_back("stop_requested");
+  scene_text_ = text.dump();
+}
+
+/// The base in free space is let go where the platform is; state_ is still the one before. That
+/// takes a while to compute, and who joins later does not know where it was.
+void LiveRun::followBase(const state_t& state) {
+  const auto runs = [](const state_t& s) { return s.segment >= 0 && inAdmittance(s); };
+  if (state_ && !let_go_ && runs(state) && !runs(*state_))
+    let_go_ = LetGo{state.header.sequence, Vec6::Map(state.x_desired), false};
+  if (let_go_ && !let_go_->computed && experiment_ && !computing_.valid()) {
+    let_go_->computed = true;
+    computing_ = std::async(std::launch::async, [e = *experiment_, x = let_go_->x] {
+      ReferenceMotions references;
+      return baseMotion(e, x, references);
+    });
+  }
+  if (computing_.valid() &&
+      computing_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) {
+    const auto base = computing_.get();
+    if (let_go_ && let_go_->computed) base_ = base;
+  }
+}
+
+void LiveRun::measureRate(const state_t& state) {
+  instants_.push_back({state.header.sequence, heard_});
+  while (instants_.size() > 2 && heard_ - instants_[1].wall > kSecond) instants_.pop_front();
+  const std::int64_t wall = heard_ - instants_.front().wall;
+  rate_ = wall < kSecond / 2 || !experiment_
+              ? NAN
+              : static_cast<double>((state.header.sequence - instants_.front().tick) *
+                                    experiment_->controller.period) /
+                    static_cast<double>(wall);
+}
+
+/// Asks again for what has not come.
+void LiveRun::remind() {
+  const std::int64_t now = monotonicNow();
+  if (state_ && !scene_ && now - heard_ < kSecond && now - asked_ > kSecond) {
+    asked_ = now;
+    query_t query;
+    query.header = header(self_, sent_++, now);
+    bus_.publish(channel::kQuery, query);
+  }
+  if (stop_ && !stop_->taken && stop_->times > 0 && now - stop_->sent > kStopRepeat) {
+    stop_->sent = now;
+    --stop_->times;
+    bus_.publish(channel::kOperator, toMessage(Order{Request::kStop, {}, {}}, controller_.source,
+                                               header(self_, stop_->sequence, now)));
+  }
+}
+
+void LiveRun::requestStop(std::int64_t edition) {
+  if (edition != edition_ || !scene_) return;
+  if (stop_ && !stop_->taken && stop_->times > 0) return;  // under way
+  stop_ = Stop{sent_++, 0, kStopTimes};
+  remind();
+}
+
+std::string LiveRun::picture() const {
+  if (!row_ || !scene_) return {};
+  std::optional<Vec6> base;
+  if (base_) base = base_->point(row_->state.header.sequence - let_go_->tick);
+  std::vector<float> numbers = scene_->picture(*row_, base);
+  numbers.push_back(static_cast<float>(rate_));
+  numbers.push_back(!stop_ ? 0.0f : stop_->taken ? 2.0f : 1.0f);
+  const double head[] = {static_cast<double>(newest_),
+                         static_cast<double>(row_->state.header.time_ns), rate_};
+  std::string out(sizeof head + numbers.size() * sizeof(float), '\0');
+  std::memcpy(out.data(), head, sizeof head);
+  std::memcpy(out.data() + sizeof head, numbers.data(), numbers.size() * sizeof(float));
+  return out;
+}
+
+}  // namespace ves

@@ -1,0 +1,379 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/page/scene.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "stl.hpp"
+#include "ves/control/safety_checks.hpp"
+#include "ves/core/coordinates.hpp"
+#include "ves/core/errors.hpp"
+#include "ves/math/dense.hpp"
+#include "ves/page/page.hpp"
+
+namespace ves {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kLinkRadius = 0.035;   // [m] of what has no shape in its description
+constexpr double kPlate = 0.02;         // [m] thickness
+constexpr double kRodRadius = 0.018;    // [m]
+constexpr double kArmRadius = 0.12;     // [m]
+constexpr double kShortestLink = 1e-3;  // [m] worth drawing
+
+Json json(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
+
+/// Of the report's platform, to which the sizes above belong.
+constexpr double kJointRadius = 0.55;  // [m]
+
+/// Axes whose z points along a leg; how they are turned about it does not matter.
+Mat3 along(const Vec3& way) {
+  const Vec3 z = way.normalized(), x = z.unitOrthogonal();
+  return (Mat3() << x, z.cross(x), z).finished();
+}
+
+Json capsule(const std::string& frame, const Vec3& from, const Vec3& to, double radius) {
+  return {{"kind", "capsule"},
+          {"frame", frame},
+          {"from", json(from)},
+          {"to", json(to)},
+          {"radius", radius}};
+}
+
+/// A plate at the joints' mean height, its corners in their order around it, and a post to each
+/// joint that is off it.
+void addPlate(Json& shapes, const std::string& frame, std::array<Vec3, kLegs> joints, double size) {
+  Vec3 middle = Vec3::Zero();
+  for (const Vec3& p : joints) middle += p / kLegs;
+  std::sort(joints.begin(), joints.end(), [&](const Vec3& a, const Vec3& b) {
+    return std::atan2(a.y() - middle.y(), a.x() - middle.x()) <
+           std::atan2(b.y() - middle.y(), b.x() - middle.x());
+  });
+  Json points = Json::array();
+  for (const Vec3& p : joints) points.push_back({p.x(), p.y()});
+  shapes.push_back({{"kind", "plate"},
+                    {"frame", frame},
+                    {"corners", points},
+                    {"top", middle.z()},
+                    {"thickness", kPlate * size}});
+  for (const Vec3& p : joints)
+    if (std::abs(p.z() - middle.z()) > kPlate * size * 0.1)
+      shapes.push_back({{"kind", "cylinder"},
+                        {"frame", frame},
+                        {"from", {p.x(), p.y(), middle.z()}},
+                        {"length", p.z() - middle.z()},
+                        {"radius", kRodRadius * size}});
+}
+
+std::string linkFrame(int i) { return fmt::format("link{}", i + 1); }
+
+}  // namespace
+
+Scene::Scene(const Experiment& e)
+    : geometry_(e.plant.geometry),
+      size_(jointRadius(geometry_) / kJointRadius),
+      payload_(e.plant.payload),
+      arm_(e.arm.value_or(ArmShape())),
+      Phi_(e.controller.admittance.Phi) {
+  if (e.robot.tool()) tool_ = *e.robot.tool();
+  description_ = {{"name", e.name},
+                  {"description", e.description},
+                  {"home", geometry_.home_height},
+                  {"size", size_},
+                  {"reach", 0.0},
+                  {"frames", Json::array()},
+                  {"shapes", Json::array()}};
+  Json& shapes = description_["shapes"];
+  addFrame("platform", "");
+  addFrame("base", "");  // where the base in free space would be
+  addPlate(shapes, "", geometry_.p_IBi_I, size_);
+  addPlate(shapes, "platform", geometry_.p_PPi_P, size_);
+  const double length = e.plant.actuator.length_min;
+  for (int i = 0; i < kLegs; ++i) {
+    const std::string leg = fmt::format("leg{}", i + 1), rod = fmt::format("rod{}", i + 1);
+    addFrame(leg, "");
+    addFrame(rod, "");
+    shapes.push_back({{"kind", "cylinder"},
+                      {"frame", leg},
+                      {"length", 0.85 * length},
+                      {"radius", 2.0 * kRodRadius * size_},
+                      {"leg", i}});
+    shapes.push_back({{"kind", "cylinder"},
+                      {"frame", rod},
+                      {"length", -length},
+                      {"radius", kRodRadius * size_},
+                      {"leg", i}});
+  }
+  shapes.push_back({{"kind", "cylinder"},
+                    {"frame", "platform"},
+                    {"radius", 0.08 * carriedSize()},
+                    {"length", payload_.X_PS.p.z()}});
+  if (!e.robot.frames.empty()) addRobot(e.robot);
+  if (e.plant.task.world) addWorld(e.plant.task.world->environment);
+  addArm();
+
+  const auto addPose = [&](const char* what, const double(state_t::*field)[6]) {
+    for (int i = 0; i < 6; ++i)
+      scalars_.push_back({fmt::format("{}_{}", coordinate(i).name, what),
+                          [field, i](const Row& r) { return (r.state.*field)[i]; }});
+  };
+  const auto add = [&](const char* name, auto value) { scalars_.push_back({name, value}); };
+  add("t_s", [](const Row& r) { return r.t; });
+  add("phase", [](const Row& r) { return static_cast<double>(r.state.phase); });
+  add("segment", [](const Row& r) { return static_cast<double>(r.state.segment); });
+  add("kind", [](const Row& r) { return static_cast<double>(r.state.kind); });
+  add("cause", [](const Row& r) { return static_cast<double>(r.state.cause); });
+  addPose("commanded", &state_t::x_desired);
+  addPose("measured", &state_t::x_measured);
+  for (int i = 0; i < 6; ++i)
+    scalars_.push_back({fmt::format("{}_actual", coordinate(i).name),
+                        [i](const Row& r) { return r.hasTruePose() ? r.truth.x[i] : NAN; }});
+  for (int i = 0; i < 6; ++i)
+    scalars_.push_back({fmt::format("{}_dynamic", wrenchComponent(i).name),
+                        [i](const Row& r) { return r.state.dynamic[i]; }});
+  for (int i = 0; i < kLegs; ++i)
+    scalars_.push_back({fmt::format("leg{}_error_m", i + 1),
+                        [i](const Row& r) { return r.state.leg[i] - r.state.leg_measured[i]; }});
+  const SafetyLimits limits = e.controller.safety;
+  for (int i = 0; i < kLegs; ++i)  // 1 in the middle of the stroke, 0 at a limit
+    scalars_.push_back({fmt::format("leg{}_margin", i + 1), [i, limits](const Row& r) {
+                          const double half = 0.5 * (limits.leg_max - limits.leg_min);
+                          return std::min(r.state.leg_measured[i] - limits.leg_min,
+                                          limits.leg_max - r.state.leg_measured[i]) /
+                                 half;
+                        }});
+  add("late_s", [](const Row& r) {
+    return r.has_timing ? static_cast<double>(r.timing.late_ns) * kSecondPerNanosecond : NAN;
+  });
+
+  Json names = Json::array(), phases = Json::array(), segments = Json::array(),
+       kinds = Json::array(), checks = Json::array();
+  for (const Scalar& scalar : scalars_) names.push_back(scalar.name);
+  for (int i = 0; i <= static_cast<int>(Phase::kStopping); ++i)
+    phases.push_back(name(static_cast<Phase>(i)));
+  for (int i = 0; i < e.controller.program.size; ++i)
+    segments.push_back(name(e.controller.program.segments[static_cast<std::size_t>(i)].kind));
+  for (int i = 0; i < static_cast<int>(SegmentKind::kCount); ++i)
+    kinds.push_back(name(static_cast<SegmentKind>(i)));
+  for (int i = 0; i < static_cast<int>(Check::kCount); ++i)
+    checks.push_back(name(static_cast<Check>(i)));
+  description_["scalars"] = names;
+  description_["phases"] = phases;
+  description_["segments"] = segments;
+  description_["kinds"] = kinds;
+  description_["checks"] = checks;
+}
+
+void Scene::addFrame(const std::string& name, const std::string& parent) {
+  frames_.push_back(name);
+  description_["frames"].push_back({{"name", name}, {"parent", parent}});
+}
+
+/// What its description shows; of links without, capsules from joint to joint and to the tool.
+void Scene::addRobot(const UrdfRobot& description) {
+  const RobotModel& robot = payload_.robot;
+  const double carried = carriedSize(), radius = kLinkRadius * carried;
+  Json& shapes = description_["shapes"];
+  const Transform X_PL0 = payload_.X_PL0();
+  shapes.push_back({{"kind", "cylinder"},
+                    {"frame", "platform"},
+                    {"from", json(payload_.X_PR.p)},
+                    {"length", X_PL0.p.z() - payload_.X_PR.p.z()},
+                    {"radius", 0.2 * carried}});
+  for (int i = 0; i < robot.size; ++i) addFrame(linkFrame(i), "platform");
+  const std::set<int> seen = addVisuals(description);
+  for (int i = 0; i < robot.size; ++i) {
+    const Link& link = robot.link(i);
+    const Vec3 joint = link.X_parent.p;
+    if (!(joint.norm() > kShortestLink) || seen.count(link.parent)) continue;
+    if (link.parent < 0)
+      shapes.push_back(capsule("platform", X_PL0.p, X_PL0 * joint, radius));
+    else
+      shapes.push_back(capsule(linkFrame(link.parent), Vec3::Zero(), joint, radius));
+  }
+  double reach = tool_ ? tool_->X_link.p.norm() : 0.0;
+  for (int i = 0; i < robot.size; ++i) reach += robot.link(i).X_parent.p.norm();
+  description_["reach"] = reach;
+  if (!tool_) return;
+  addFrame("tool", "platform");
+  if (tool_->link >= 0 && !seen.count(tool_->link) && tool_->X_link.p.norm() > kShortestLink)
+    shapes.push_back(capsule(linkFrame(tool_->link), Vec3::Zero(), tool_->X_link.p, radius));
+  shapes.push_back({{"kind", "axes"}, {"frame", "tool"}, {"size", 0.15 * carried}});
+}
+
+/// Returns the links that are drawn: -1 is link 0.
+std::set<int> Scene::addVisuals(const UrdfRobot& description) {
+  std::set<int> seen;
+  for (const Visual& visual : description.visuals) {
+    const NamedFrame& frame = description.frames[static_cast<std::size_t>(visual.frame)];
+    const Transform X =
+        (frame.link < 0 ? payload_.X_PL0() : Transform()) * frame.X_link * visual.X_frame;
+    const Eigen::Quaterniond q(X.R);
+    Json shape = {{"kind", ""},
+                  {"frame", frame.link < 0 ? "platform" : linkFrame(frame.link)},
+                  {"position", json(X.p)},
+                  {"quaternion", {q.x(), q.y(), q.z(), q.w()}}};
+    switch (visual.kind) {
+      case Visual::Kind::kBox:
+        shape["kind"] = "box";
+        shape["size"] = json(visual.size);
+        break;
+      case Visual::Kind::kCylinder:
+        shape["kind"] = "rod";
+        shape["radius"] = visual.size(0);
+        shape["length"] = visual.size(1);
+        break;
+      case Visual::Kind::kSphere:
+        shape["kind"] = "sphere";
+        shape["radius"] = visual.size(0);
+        break;
+      case Visual::Kind::kMesh: {
+        const std::filesystem::path file = findMesh(visual.mesh);
+        if (file.empty()) {
+          warnings_.push_back(
+              fmt::format("{}: not found, its link is drawn as a line", visual.mesh));
+          continue;
+        }
+        std::vector<float> corners;
+        try {
+          for (const Vec3& p : readStl(file))
+            for (const double x :
+                 {p.x() * visual.size(0), p.y() * visual.size(1), p.z() * visual.size(2)})
+              corners.push_back(static_cast<float>(x));
+        } catch (const InputError& error) {
+          warnings_.push_back(error.what());
+          continue;
+        }
+        shape["kind"] = "mesh";
+        shape["triangles"] = base64(corners);
+      }
+    }
+    description_["shapes"].push_back(shape);
+    seen.insert(frame.link);
+  }
+  return seen;
+}
+
+/// What the tool may touch. Of a half space a part of its surface.
+void Scene::addWorld(const Environment& environment) {
+  constexpr double kShown = 0.4, kThick = 0.01;  // [m]
+  Json& shapes = description_["shapes"];
+  const auto add = [&](const std::string& frame, const Transform& X, const Shape& shape) {
+    const auto put = [&](Json one, const Vec3& p_BQ_B) {
+      const Eigen::Quaterniond q(X.R);
+      one["frame"] = frame;
+      one["position"] = json(X * p_BQ_B);
+      one["quaternion"] = {q.x(), q.y(), q.z(), q.w()};
+      one["world"] = true;
+      shapes.push_back(one);
+    };
+    const auto box = [&](const Vec3& size, const Vec3& at) {
+      put({{"kind", "box"}, {"size", json(size)}}, at);
+    };
+    if (const Ball* ball = std::get_if<Ball>(&shape)) {
+      put({{"kind", "sphere"}, {"radius", ball->radius}}, Vec3::Zero());
+    } else if (const Box* block = std::get_if<Box>(&shape)) {
+      box(block->size, Vec3::Zero());
+    } else if (const Socket* socket = std::get_if<Socket>(&shape)) {
+      // Four boards around the hole, and its floor.
+      const double r = socket->radius + socket->chamfer, w = 0.5 * kShown - r;
+      for (const double side : {-1.0, 1.0}) {
+        box({w, kShown, kThick}, {side * (r + 0.5 * w), 0.0, -0.5 * kThick});
+        box({2.0 * r, w, kThick}, {0.0, side * (r + 0.5 * w), -0.5 * kThick});
+      }
+      box({2.0 * r, 2.0 * r, kThick}, {0.0, 0.0, -socket->depth - 0.5 * kThick});
+    } else {
+      box({kShown, kShown, kThick}, {0.0, 0.0, -0.5 * kThick});
+    }
+  };
+  for (const FixedBody& body : environment.bodies) add("", body.X_IB, body.shape);
+  if (!environment.target) return;
+  target_ = environment.target->start;
+  addFrame("target", "");
+  add("target", Transform(), environment.target->shape);
+}
+
+void Scene::addArm() {
+  Json points = Json::array();
+  const Transform X_IP = geometry_.fromHome(Pose());
+  for (const Vec3& p : arm_.points) points.push_back(json(X_IP * p));
+  description_["arm"] = points;
+  description_["arm_radius"] = kArmRadius * size_;
+}
+
+std::vector<float> Scene::picture(const Row& row, const std::optional<Vec6>& base) const {
+  std::vector<float> out;
+  out.reserve(width());
+  const auto put = [&](const Transform& X) {
+    const Eigen::Quaterniond q(X.R);
+    for (const double x : {X.p.x(), X.p.y(), X.p.z(), q.x(), q.y(), q.z(), q.w()})
+      out.push_back(static_cast<float>(x));
+  };
+  // Where nobody knows the truth, what is measured.
+  const Vec6 x =
+      row.hasTruePose() ? Vec6(Vec6::Map(row.truth.x)) : Vec6(Vec6::Map(row.state.x_measured));
+  const JointVector q = row.has_truth    ? JointVector(JointVector::Map(row.truth.q))
+                        : row.has_sample ? JointVector(JointVector::Map(row.sample.q))
+                                         : JointVector(JointVector::Zero());
+  const Transform X_IP = geometry_.fromHome(Pose::from(x));
+  put(X_IP);
+  if (base)
+    put(geometry_.fromHome(Pose::from(*base)));
+  else
+    out.insert(out.end(), 7, NAN);
+  for (std::size_t i = 0; i < kLegs; ++i) {
+    const Vec3 from = geometry_.p_IBi_I[i], to = X_IP * geometry_.p_PPi_P[i];
+    const Mat3 R = along(to - from);
+    put({R, from});
+    put({R, to});
+  }
+  const LinkPoses X_L0L = linkPoses(payload_.robot, q);
+  const Transform X_PL0 = payload_.X_PL0();
+  for (int i = 0; i < payload_.robot.size; ++i) put(X_PL0 * X_L0L[i]);
+  if (tool_) put(X_PL0 * tool_->pose(X_L0L));
+  if (target_ && row.has_truth) {
+    Floating target;
+    target.p = Vec3::Map(row.truth.target_p);
+    target.q.coeffs() = Eigen::Vector4d::Map(row.truth.target_q);
+    put(target.X_IB());
+  } else if (target_) {
+    put(target_->X_IB());
+  }
+  if (!arm_.points.empty()) {  // bent as the tip is moved
+    const Eigen::VectorXd eta = leastSquares(Phi_, x);
+    const Mat3 R_IP = geometry_.fromHome(Pose()).R;
+    for (const Eigen::Matrix3Xd& displacement : arm_.displacements) {
+      const Vec3 u = R_IP * (displacement * eta);
+      for (const double c : {u.x(), u.y(), u.z()}) out.push_back(static_cast<float>(c));
+    }
+  }
+  for (const Scalar& scalar : scalars_) out.push_back(static_cast<float>(scalar.value(row)));
+  return out;
+}
+
+nlohmann::ordered_json recording(const Series& series, double rate,
+                                 std::vector<std::string>& warnings) {
+  const Scene scene(series.experiment);
+  warnings.insert(warnings.end(), scene.warnings().begin(), scene.warnings().end());
+  const std::optional<Emulation> emulated = emulation(series);
+  const auto base = emulated ? basePoses(series, emulated->base) : std::map<std::int64_t, Vec6>();
+  std::vector<float> numbers;
+  double next = -HUGE_VAL;
+  for (const Row& row : series.rows) {
+    if (row.t < next - 0.5e-9) continue;
+    next = row.t + 1.0 / rate;
+    const auto at = base.find(row.state.header.sequence);
+    const std::vector<float> one =
+        scene.picture(row, at == base.end() ? std::nullopt : std::optional<Vec6>(at->second));
+    numbers.insert(numbers.end(), one.begin(), one.end());
+  }
+  Json out = {{"scene", scene.description()}, {"width", scene.width()}};
+  out["pictures"] = base64(numbers);
+  return out;
+}
+
+}  // namespace ves

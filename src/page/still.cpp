@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/page/still.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+
+namespace ves {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+double number(const Json& x) { return x.get<double>(); }
+Vec3 point(const Json& p) { return Vec3(number(p[0]), number(p[1]), number(p[2])); }
+
+/// Bodies as strokes and polygons, seen from above and aside.
+class Drawing {
+ public:
+  /// A line of two ends, or a polygon.
+  struct Thing {
+    double depth = 0.0;               // [m] towards the eye
+    std::vector<Eigen::Vector2d> at;  // [m] to the right, down
+    bool closed = false;
+    std::string look;  // its other attributes
+
+    std::string points() const {
+      std::string out;
+      for (const Eigen::Vector2d& p : at)
+        out += fmt::format("{}{:.4f},{:.4f}", out.empty() ? "" : " ", p.x(), p.y());
+      return out;
+    }
+  };
+
+  void stroke(const Vec3& a, const Vec3& b, double width, const char* colour, bool round) {
+    add({a, b}, width, false,
+        fmt::format("stroke=\"{}\" stroke-width=\"{:.4f}\" stroke-linecap=\"{}\"", colour, width,
+                    round ? "round" : "butt"));
+  }
+  void polygon(const std::vector<Vec3>& corners, const char* colour) {
+    add(corners, 0.0, true, fmt::format("fill=\"{}\"", colour));
+  }
+
+  const std::vector<Thing>& things() const { return things_; }
+  const Eigen::AlignedBox2d& box() const { return box_; }
+
+ private:
+  void add(const std::vector<Vec3>& points, double width, bool closed, std::string look) {
+    const Vec3 eye = Vec3(0.62, -0.95, 0.5).normalized();
+    const Vec3 right = Vec3::UnitZ().cross(eye).normalized(), up = eye.cross(right);
+    Thing thing;
+    thing.closed = closed;
+    thing.look = std::move(look);
+    for (const Vec3& p : points) {
+      thing.depth += eye.dot(p) / static_cast<double>(points.size());
+      thing.at.push_back({right.dot(p), -up.dot(p)});
+      const Eigen::Vector2d room = Eigen::Vector2d::Constant(0.5 * width);
+      box_.extend(thing.at.back() - room).extend(thing.at.back() + room);
+    }
+    things_.push_back(std::move(thing));
+  }
+
+  std::vector<Thing> things_;
+  Eigen::AlignedBox2d box_;
+};
+
+/// One drawing, or several of the same things as they move, the last one `seconds` after the first;
+/// those behind first.
+std::string svg(const std::vector<Drawing>& drawings, double seconds) {
+  Eigen::AlignedBox2d box;
+  for (const Drawing& d : drawings) box.extend(d.box());
+  const Eigen::Vector2d margin = Eigen::Vector2d::Constant(0.03 * box.diagonal().norm());
+  const Eigen::Vector2d low = box.min() - margin, size = box.sizes() + 2.0 * margin;
+  std::string out = fmt::format(
+      "<svg viewBox=\"{:.4f} {:.4f} {:.4f} {:.4f}\" xmlns=\"http://www.w3.org/2000/svg\">\n",
+      low.x(), low.y(), size.x(), size.y());
+  const std::vector<Drawing::Thing>& first = drawings.front().things();
+  std::vector<std::size_t> order(first.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return first[a].depth < first[b].depth; });
+  for (const std::size_t i : order) {
+    const char* const kind = first[i].closed ? "polygon" : "polyline";
+    out += fmt::format("<{} points=\"{}\" {}{}", kind, first[i].points(),
+                       first[i].closed ? "" : "fill=\"none\" ", first[i].look);
+    std::string values;
+    bool moves = false;
+    for (const Drawing& d : drawings) {
+      const std::string points = d.things()[i].points();
+      moves = moves || points != first[i].points();
+      values += (values.empty() ? "" : ";") + points;
+    }
+    out += moves ? fmt::format(
+                       "><animate attributeName=\"points\" dur=\"{:g}s\" "
+                       "repeatCount=\"indefinite\" values=\"{}\"/></{}>\n",
+                       seconds, values, kind)
+                 : "/>\n";
+  }
+  return out + "</svg>\n";
+}
+
+constexpr const char* kMetal = "#8d99a6";
+constexpr const char* kPlates = "#6b7885";
+constexpr const char* kRobot = "#e0903a";
+constexpr const char* kArm = "#b9a878";
+
+/// One instant of a scene, by its numbers (Scene::picture).
+Drawing drawn(const Scene& scene, const std::vector<float>& picture, StillView view) {
+  const Json& d = scene.description();
+  std::map<std::string, Transform> frames = {{"", Transform()}};
+  std::size_t at = 0;
+  for (const Json& frame : d["frames"]) {
+    const float* p = picture.data() + at;
+    const Transform X{Eigen::Quaterniond(p[6], p[3], p[4], p[5]).toRotationMatrix(),
+                      Vec3(p[0], p[1], p[2])};
+    frames[frame["name"].get<std::string>()] = frames[frame["parent"].get<std::string>()] * X;
+    at += 7;
+  }
+  Drawing drawing;
+  for (const Json& shape : d["shapes"]) {
+    const Transform& X = frames[shape["frame"].get<std::string>()];
+    const auto kind = shape["kind"].get<std::string>();
+    if (kind == "plate") {
+      std::vector<Vec3> corners;
+      for (const Json& c : shape["corners"])
+        corners.push_back(X * Vec3(number(c[0]), number(c[1]), number(shape["top"])));
+      drawing.polygon(corners, kPlates);
+    } else if (kind == "cylinder") {
+      const Vec3 from = shape.contains("from") ? point(shape["from"]) : Vec3(Vec3::Zero());
+      drawing.stroke(X * from, X * Vec3(from + Vec3(0.0, 0.0, number(shape["length"]))),
+                     2.0 * number(shape["radius"]), kMetal, false);
+    } else if (kind == "rod" || kind == "sphere" || kind == "box") {  // meshes are too fine
+      const Json& q = shape["quaternion"];
+      const Transform here =
+          X * Transform{Eigen::Quaterniond(number(q[3]), number(q[0]), number(q[1]), number(q[2]))
+                            .toRotationMatrix(),
+                        point(shape["position"])};
+      Vec3 half(0.0, 0.0, 0.0);
+      double width = 0.0;
+      if (kind == "box") {
+        const Vec3 size = point(shape["size"]);
+        Eigen::Index longest = 0;
+        size.maxCoeff(&longest);
+        half(longest) = 0.5 * size(longest);
+        width = std::sqrt(size.prod() / size(longest));
+      } else {
+        if (kind == "rod") half.z() = 0.5 * number(shape["length"]);
+        width = 2.0 * number(shape["radius"]);
+      }
+      drawing.stroke(here * Vec3(-half), here * half, width, kRobot, kind == "sphere");
+    } else if (kind == "capsule") {
+      drawing.stroke(X * point(shape["from"]), X * point(shape["to"]),
+                     2.0 * number(shape["radius"]), kRobot, true);
+    }
+  }
+  if (view == StillView::kArm)
+    for (std::size_t i = 1; i < d["arm"].size(); ++i)
+      drawing.stroke(point(d["arm"][i - 1]), point(d["arm"][i]), 2.0 * number(d["arm_radius"]),
+                     kArm, true);
+  return drawing;
+}
+
+}  // namespace
+
+std::string stillAtStart(const Experiment& experiment, StillView view) {
+  Row row;
+  Vec6::Map(row.state.x_measured).setZero();
+  JointVector::Map(row.sample.q) = experiment.plant.task.initial_joints;
+  row.has_sample = true;
+  const Scene scene(experiment);
+  return svg({drawn(scene, scene.picture(row, {}), view)}, 0.0);
+}
+
+std::string moving(const Series& series, const MovingOptions& options) {
+  const Scene scene(series.experiment);
+  std::vector<Drawing> drawings;
+  for (const Row& row : series.rows) {
+    const double next = options.from + static_cast<double>(drawings.size()) / options.rate;
+    if (row.t < next - 0.5e-9 || row.t > options.to) continue;
+    drawings.push_back(drawn(scene, scene.picture(row, {}), StillView::kPlatform));
+  }
+  if (drawings.empty())
+    throw InputError(fmt::format("nothing between {} and {} s: the log has 0 to {:.2f} s",
+                                 options.from, options.to,
+                                 series.rows.empty() ? 0.0 : series.rows.back().t));
+  return svg(drawings, static_cast<double>(drawings.size() - 1) / options.rate);
+}
+
+}  // namespace ves
