@@ -95,7 +95,7 @@ TEST(Supervisor, AdmittanceControlNeedsAVerdictAndALightSensor) {
 TEST(Supervisor, ALoopThatGrowsSlowlyIsLetPassForSoLong) {
   ControllerConfig config = puma();
   config.stability = config.stability_uncompensated = Stability::kStable;
-  config.stable_for_uncompensated = 20.0;
+  config.stable_for = config.stable_for_uncompensated = 20.0;
   for (const auto& [duration, refusal] :
        {std::pair{20.0, Refusal::kNone}, {20.01, Refusal::kTooLong}, {kNan, Refusal::kTooLong}}) {
     Desk desk(config);
@@ -105,6 +105,7 @@ TEST(Supervisor, ALoopThatGrowsSlowlyIsLetPassForSoLong) {
   }
   // What an order began may last longer than that: its loop is not changed to such a one.
   config.compensation.feed_forward = true;
+  config.stable_for = HUGE_VAL;
   Desk desk(config);
   desk.arm();
   EXPECT_EQ(desk.order(Request::kRun, test::segment(SegmentKind::kAdmittance, 60.0)).refusal,

@@ -13,7 +13,6 @@
 #include "ves/core/big_endian.hpp"
 #include "ves/export/lcm_definition.hpp"
 #include "ves/export/mcap.hpp"
-#include "ves/page/sources.hpp"
 
 namespace ves {
 namespace {
