@@ -208,7 +208,7 @@ LoopVerdict assessStability(const ControllerConfig& controller, const RobotTask&
     out.direction = direction;
   }
   out.worst = dominantRoot(out.direction == Direction::kExtending ? out.extending : out.retracting);
-  if (out.stable && !isStable(controller, task)) out.stable_for = out.longest;
+  if (out.stable && growth > 0.0 && !isStable(controller, task)) out.stable_for = out.longest;
   if (out.as_believed) return out;
   out.stable_modes = 0;
   while (out.stable_modes < out.modes &&
@@ -264,9 +264,9 @@ std::string explain(const LoopVerdict& v) {
 std::string applyStabilityCheck(ControllerConfig& controller, const RobotTask& task) {
   const auto assess = [&](const ControllerConfig& c, Stability& verdict, double& stable_for) {
     const bool decays = isStable(c, task);
-    verdict = (decays || isStable(c, task, allowedGrowth(c))) && contactsDecay(c, task)
-                  ? Stability::kStable
-                  : Stability::kUnstable;
+    const double growth = allowedGrowth(c);
+    const bool passes = decays || (growth > 0.0 && isStable(c, task, growth));
+    verdict = passes && contactsDecay(c, task) ? Stability::kStable : Stability::kUnstable;
     stable_for = decays ? HUGE_VAL : c.longestAdmittance();
   };
   const bool forced = controller.stability == Stability::kForced;

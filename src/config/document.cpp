@@ -267,6 +267,13 @@ void Value::put(std::string key, Value value) {
   children.push_back(std::move(value));
 }
 
+void Value::erase(std::string_view key) {
+  const auto at = std::find(keys.begin(), keys.end(), key);
+  if (at == keys.end()) return;
+  children.erase(children.begin() + (at - keys.begin()));
+  keys.erase(at);
+}
+
 Value loadDocument(const std::filesystem::path& path) { return load(path, "", 0); }
 
 Value parseDocument(const std::string& text, const std::string& name) {

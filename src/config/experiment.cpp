@@ -267,9 +267,14 @@ std::string applyStabilityCheck(Experiment& e) {
   const ControllerConfig& c = e.controller;
   put("stability", verdict(c.stability));
   put("stability_uncompensated", verdict(c.stability_uncompensated));
-  if (std::isfinite(c.stable_for)) put("stable_for_s", fmt::format("{}", c.stable_for));
-  if (std::isfinite(c.stable_for_uncompensated))
-    put("stable_for_uncompensated_s", fmt::format("{}", c.stable_for_uncompensated));
+  const auto putSeconds = [&](const char* key, double seconds) {
+    if (std::isfinite(seconds))
+      put(key, fmt::format("{}", seconds));
+    else
+      controller.erase(key);  // an earlier verdict's
+  };
+  putSeconds("stable_for_s", c.stable_for);
+  putSeconds("stable_for_uncompensated_s", c.stable_for_uncompensated);
   e.source.resolved = emit(e.source.document);
   e.source.hash = fingerprint(e.source.resolved);
   return why;

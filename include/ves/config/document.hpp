@@ -40,6 +40,8 @@ struct Value {
   Value* find(std::string_view key);
   /// Of a map: adds the key, or replaces what it had.
   void put(std::string key, Value value);
+  /// Of a map: the key is gone, if it was there.
+  void erase(std::string_view key);
 };
 
 /// Reads a file with everything it is made from, `from` and `urdf` replaced by what they name.
