@@ -15,8 +15,8 @@
 #include "ves/bus/bus.hpp"
 #include "ves/bus/channels.hpp"
 #include "ves/bus/fields.hpp"
-#include "ves/series/series.hpp"
 #include "ves/export/lcm_definition.hpp"
+#include "ves/series/series.hpp"
 
 namespace ves {
 namespace {
@@ -102,6 +102,7 @@ Sample filledSample() {
 MachineSetup filledSetup() {
   auto s = filled<MachineSetup>();
   s.legs.scale *= 1e-3;
+  s.joint_max += s.joint_max;
   s.joints = 7;
   return s;
 }
@@ -149,6 +150,22 @@ TEST(Schema, AStateThatNamesNoSuchPhaseIsNone) {
   EXPECT_FALSE(with([](state_t& m) { m.refusal = -1; }));
   EXPECT_FALSE(with([](state_t& m) { m.tripped = 1 << static_cast<int>(Check::kCount); }));
   EXPECT_FALSE(with([](state_t& m) { m.engaged = 2; }));
+}
+
+TEST(Schema, ASetupThatNoDriverCanKeepIsNone) {
+  const auto with = [](auto change) {
+    setup_t m = toMessage(filledSetup(), header({1, 2}, 3, 4));
+    change(m);
+    return fromMessage(m).has_value();
+  };
+  EXPECT_TRUE(with([](setup_t&) {}));
+  for (void (*change)(setup_t&) :
+       {+[](setup_t& m) { m.leg_scale[3] = 0.0; }, +[](setup_t& m) { m.leg_offset[5] = NAN; },
+        +[](setup_t& m) { m.leg_home[0] = kMaxLegCount + 1; },
+        +[](setup_t& m) { m.hold_after_ns = 0; }, +[](setup_t& m) { m.joints = kMaxJoints + 1; },
+        +[](setup_t& m) { m.leg_velocity = NAN; }, +[](setup_t& m) { m.joint_max[2] = NAN; },
+        +[](setup_t& m) { m.wrench_per_count[35] = INFINITY; }})
+    EXPECT_FALSE(with(change));
 }
 
 TEST(Schema, EveryFieldComesOutOfTheBus) {

@@ -12,6 +12,31 @@
 namespace ves::schema {
 namespace {
 
+/// So many numbers of the LCM type that `name` says.
+struct Shape {
+  const char* type;
+  int size;  // 0: no list
+};
+
+Shape shapeOf(std::int64_t) { return {"int64_t", 0}; }
+Shape shapeOf(std::int32_t) { return {"int32_t", 0}; }
+Shape shapeOf(std::uint32_t) { return {"int32_t", 0}; }
+Shape shapeOf(double) { return {"double", 0}; }
+Shape shapeOf(bool) { return {"int8_t", 0}; }
+Shape shapeOf(Tripped) { return {"int32_t", 0}; }
+Shape shapeOf(const Wrench&) { return {"double", 6}; }
+Shape shapeOf(const Pose&) { return {"double", 6}; }
+template <typename E>
+requires std::is_enum_v<E> Shape shapeOf(E) { return {"int32_t", 0}; }
+template <std::size_t N>
+Shape shapeOf(const std::array<std::int32_t, N>&) {
+  return {"int32_t", static_cast<int>(N)};
+}
+template <int R, int C>
+Shape shapeOf(const Eigen::Matrix<double, R, C>&) {
+  return {"double", R * C};
+}
+
 /// "; 0 disarmed, 1 armed, ...": the numbers that an enumeration or a set has.
 template <typename E>
 std::string numbers(const char* before, E last) {

@@ -23,6 +23,8 @@ constexpr double kMaxReach = 100.0;                 // [m] of a tool
 constexpr double kMaxLoad = 1e6;                    // [kg]
 constexpr double kMaxLoadInertia = 1e7;             // [kg m^2]
 
+constexpr double kMaxWrenchPerCount = 1e6;  // [N | N m]
+
 template <typename T>
 bool inRange(T x, T lo, T hi) {
   return x >= lo && x <= hi;
@@ -117,7 +119,10 @@ bool plausible(const MachineSetup& s) noexcept {
   bool good = s.period > 0 && inRange(s.joints, 0, kMaxJoints) && legCounts(s.leg_home) &&
               s.watchdog.hold_after > 0 && s.watchdog.park_after > 0 && s.watchdog.park_time > 0;
   for (const double scale : s.legs.scale) good = good && inRange(scale, 1e-9, 1.0);
-  return good && within(s.legs.offset, kMaxReach);
+  for (int i = 0; i < kMaxJoints; ++i)  // a joint may turn without end
+    good = good && s.joint_min(i) <= s.joint_max(i);
+  return good && within(s.legs.offset, kMaxReach) && inRange(s.leg_velocity, 0.0, kMaxToolSpeed) &&
+         within(s.wrench_per_count.reshaped(), kMaxWrenchPerCount);
 }
 
 }  // namespace ves

@@ -260,31 +260,6 @@ constexpr void forEach(S& s, F f) {
 
 // ---- values as messages have them
 
-/// So many numbers of the LCM type that `name` says.
-struct Shape {
-  const char* type;
-  int size;  // 0: no list
-};
-
-inline Shape shapeOf(std::int64_t) { return {"int64_t", 0}; }
-inline Shape shapeOf(std::int32_t) { return {"int32_t", 0}; }
-inline Shape shapeOf(std::uint32_t) { return {"int32_t", 0}; }
-inline Shape shapeOf(double) { return {"double", 0}; }
-inline Shape shapeOf(bool) { return {"int8_t", 0}; }
-inline Shape shapeOf(Tripped) { return {"int32_t", 0}; }
-inline Shape shapeOf(const Wrench&) { return {"double", 6}; }
-inline Shape shapeOf(const Pose&) { return {"double", 6}; }
-template <typename E>
-requires std::is_enum_v<E> Shape shapeOf(E) { return {"int32_t", 0}; }
-template <std::size_t N>
-Shape shapeOf(const std::array<std::int32_t, N>&) {
-  return {"int32_t", static_cast<int>(N)};
-}
-template <int R, int C>
-Shape shapeOf(const Eigen::Matrix<double, R, C>&) {
-  return {"double", R * C};
-}
-
 template <typename T>
 requires(std::is_arithmetic_v<T> && !std::same_as<T, bool>) void put(T from, auto& to) noexcept {
   to = static_cast<std::remove_reference_t<decltype(to)>>(from);
