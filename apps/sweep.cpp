@@ -57,7 +57,7 @@ int sweepCommand(int argc, char** argv) {
       ->check(CLI::Range(std::int64_t{0}, std::int64_t{UINT32_MAX}))
       ->capture_default_str();
   cli.add_option("--set", sets, "KEY.PATH=VALUE of every run")->allow_extra_args(false);
-  addWorkers(cli, workers, "processes");
+  addWorkers(cli, workers, "runs at a time");
   cli.add_option("--out", out, "folder; ves-runs/sweep-SCENARIO by default");
   return run(cli, argc, argv, [&, rank = rank, ranks = ranks] {
     SweepPlan plan;

@@ -157,10 +157,10 @@ std::optional<experiment_t> decode<experiment_t>(const void* data, std::int64_t 
   return message;
 }
 
-std::string names(Tripped tripped) {
+std::string names(Tripped tripped, std::string_view between) {
   std::string out;
   tripped.forEach([&](Check check) {
-    if (!out.empty()) out += ", ";
+    if (!out.empty()) out += between;
     out += name(check);
   });
   return out;

@@ -170,13 +170,6 @@ std::pair<std::string, std::string> part(schema::Along along, std::string_view u
   }
 }
 
-/// The names of a set, with + between; - when it is empty.
-std::string namesOf(Tripped set) {
-  std::string out;
-  set.forEach([&](Check check) { out += (out.empty() ? "" : "+") + std::string(name(check)); });
-  return out.empty() ? "-" : out;
-}
-
 /// Every field of a state: a column a number, enumerations and sets by their names.
 void addState(const Experiment& e, std::vector<Column>& out) {
   const std::set<std::string_view> hidden = [&] {
@@ -217,7 +210,8 @@ void addState(const Experiment& e, std::vector<Column>& out) {
         column.text = [=](const Row& r) { return std::string(ves::name(static_cast<V>(read(r)))); };
       if constexpr (std::same_as<V, Tripped>)
         column.text = [=](const Row& r) {
-          return namesOf(Tripped(static_cast<std::uint32_t>(read(r))));
+          const std::string set = names(Tripped(static_cast<std::uint32_t>(read(r))), "+");
+          return set.empty() ? "-" : set;
         };
       out.push_back(column);
     }
@@ -327,17 +321,12 @@ bool selected(const std::string& name, const std::vector<std::string>& select,
   return take;
 }
 
-namespace {
-
-/// As a field of a table (RFC 4180).
-std::string csvField(std::string text) {
-  if (text.find_first_of(",\"") == std::string::npos) return text;
-  for (std::size_t at = 0; (at = text.find('"', at)) != std::string::npos; at += 2)
-    text.insert(at, 1, '"');
-  return '"' + text + '"';
+std::string csvField(const std::string& text) {
+  if (text.find_first_of(",\"\n") == std::string::npos) return text;
+  std::string out = "\"";
+  for (const char c : text) out += c == '"' ? "\"\"" : std::string(1, c == '\n' ? ' ' : c);
+  return out + "\"";
 }
-
-}  // namespace
 
 std::string csvHeader(const std::vector<Column>& columns) {
   std::string line;

@@ -17,8 +17,8 @@
 #include <map>
 #include <mutex>
 
-#include "ves/realtime/realtime.hpp"
 #include "ves/evaluation/summary.hpp"
+#include "ves/realtime/realtime.hpp"
 
 namespace ves {
 namespace {
@@ -64,14 +64,6 @@ constexpr const char* kNumbers[] = {"simulated_s",
                                     "contact_restitution_free_space",
                                     "contact_energy_error"};
 
-/// A cell of CSV.
-std::string cell(const std::string& text) {
-  if (text.find_first_of(",\"\n") == std::string::npos) return text;
-  std::string out = "\"";
-  for (const char c : text) out += c == '"' ? "\"\"" : std::string(1, c == '\n' ? ' ' : c);
-  return out + "\"";
-}
-
 /// How many cells a line of CSV has.
 std::ptrdiff_t cells(const std::string& line) {
   bool inside = false;
@@ -83,7 +75,7 @@ std::ptrdiff_t cells(const std::string& line) {
 
 std::string headerOf(const SweepPlan& plan) {
   std::string line = "run";
-  for (const std::string& key : plan.keys()) line += fmt::format(",{}", cell(key));
+  for (const std::string& key : plan.keys()) line += fmt::format(",{}", csvField(key));
   line += ",ended,first_cause,first_cause_tick";
   for (const char* number : kNumbers) line += fmt::format(",{}", number);
   return line;
@@ -96,7 +88,7 @@ std::string rowOf(const SweepPlan& plan, const Value& scenario, std::int64_t run
   std::string row = fmt::format("{}", run);
   for (const std::string& one : plan.overrides(run)) {
     all.push_back(one);
-    row += fmt::format(",{}", cell(one.substr(one.find('=') + 1)));
+    row += fmt::format(",{}", csvField(one.substr(one.find('=') + 1)));
   }
   const std::string rest = std::string(std::size(kNumbers), ',');
   try {
@@ -104,7 +96,7 @@ std::string rowOf(const SweepPlan& plan, const Value& scenario, std::int64_t run
     const std::string diverges =
         wantsAdmittance(e.controller.program) ? applyStabilityCheck(e) : std::string();
     if (e.controller.stability == Stability::kUnstable)
-      return row + ",refused," + cell(diverges) + "," + rest;
+      return row + ",refused," + csvField(diverges) + "," + rest;
     const RecordedRun recorded = recordLockstep(e);
     const RunResult& result = recorded.result;
     const auto summary = summarise(recorded.series, result, references);
@@ -114,7 +106,7 @@ std::string rowOf(const SweepPlan& plan, const Value& scenario, std::int64_t run
       row += summary.contains(number) ? fmt::format(",{}", summary[number].get<double>()) : ",";
     return row;
   } catch (const InputError& error) {
-    return row + ",invalid," + cell(error.what()) + "," + rest;
+    return row + ",invalid," + csvField(error.what()) + "," + rest;
   }
 }
 

@@ -47,7 +47,7 @@ operator_t toMessage(const Order& order, std::int64_t controller, const header_t
 robot_command_t toMessage(const RobotOrder& order, const header_t& header) noexcept;
 
 /// "panic button, floor mat"; empty when none tripped.
-std::string names(Tripped tripped);
+std::string names(Tripped tripped, std::string_view between = ", ");
 
 /// Nothing where a value is out of range or not a number (contract/plausible.hpp).
 std::optional<Sample> fromMessage(const sample_t& message) noexcept;

@@ -86,6 +86,9 @@ std::vector<Column> columns(const Experiment& experiment);
 bool selected(const std::string& name, const std::vector<std::string>& select,
               std::vector<bool>& used);
 
+/// As a field of a table (RFC 4180); a new line becomes a space.
+std::string csvField(const std::string& text);
+
 /// Lines of a table, without their end.
 std::string csvHeader(const std::vector<Column>& columns);
 std::string csvRow(const std::vector<Column>& columns, const Row& row);
