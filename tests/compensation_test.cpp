@@ -13,10 +13,10 @@
 #include "support/robots.hpp"
 #include "ves/analysis/gate.hpp"
 #include "ves/config/servo.hpp"
+#include "ves/evaluation/comparison.hpp"
 #include "ves/identification/sensor_timing.hpp"
 #include "ves/identification/servo_identification.hpp"
 #include "ves/math/dense.hpp"
-#include "ves/evaluation/comparison.hpp"
 #include "ves/run/run.hpp"
 
 namespace ves {
@@ -640,6 +640,16 @@ TEST(ServoIdentification, FindsWhatTheMachineIs) {
     EXPECT_EQ(allowed.mass_error, 3.0 * 1e-3);
     EXPECT_GT(allowed.gain_error, 2.9 * found.deviation.extend(0) / found.servo.extend(0));
     EXPECT_LT(allowed.gain_error, 0.05);
+    // In place of what the keys say, but for what may be learnt.
+    Compensation guessed;
+    guessed.gain_error = guessed.timing_error = guessed.mass_error = 0.4;
+    const Compensation known = withRecord(guessed, again);
+    EXPECT_EQ(known.gain_error, allowed.gain_error);
+    EXPECT_EQ(known.timing_error, allowed.timing_error);
+    EXPECT_EQ(known.mass_error, allowed.mass_error);
+    guessed.adaptation = true;
+    EXPECT_EQ(withRecord(guessed, again).gain_error, 0.4);
+    EXPECT_EQ(withRecord(guessed, again).timing_error, 0.4);
   }
 }
 

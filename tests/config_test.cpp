@@ -506,5 +506,19 @@ TEST(Config, LoadsAreToldInTheOrderOfTheirTimes) {
   EXPECT_EQ(told.loads[1].cue.after, 6'000'000'000);
 }
 
+TEST(Config, WhatDecidesAboutSafetyIsAKey) {
+  const SafetyLimits l =
+      test::experiment("z_sine", {"safety.reading_speed=2.5", "safety.speed_memory_s=0.7",
+                                  "safety.reading_patience=3", "safety.growth_window_s=0.25",
+                                  "safety.window_growth=1.75", "safety.tool_singularity=0.125"})
+          .controller.safety;
+  EXPECT_EQ(l.reading_speed, 2.5);
+  EXPECT_EQ(l.speed_memory, 0.7);
+  EXPECT_EQ(l.reading_patience, 3);
+  EXPECT_EQ(l.window, 0.25);
+  EXPECT_EQ(l.window_growth, 1.75);
+  EXPECT_EQ(l.tool_singularity, 0.125);
+}
+
 }  // namespace
 }  // namespace ves
