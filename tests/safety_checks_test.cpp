@@ -6,6 +6,8 @@
 
 #include <Eigen/SVD>
 #include <random>
+#include <set>
+#include <sstream>
 
 #include "support/poses.hpp"
 #include "support/rig.hpp"
@@ -216,6 +218,97 @@ TEST(PathChecks, NoLegLiesDownOnAPlate) {
   EXPECT_FALSE(collideCheck(limits, g, home));
 }
 
+/// A tick in which all is well: the platform stands at home, its sample is true.
+struct Tick {
+  ControllerConfig config = experiment("puma_on_table_4_1").controller;
+  Proposal proposal = inverseKinematics(config.geometry, {atRest(Vec6::Zero())});
+  LegContext context{proposal.legs.L, proposal.legs.L};
+  Sample sample;
+  Oscillation oscillation;
+  Elapsed elapsed;
+  bool conflict = false;
+  int fresh = 1;                      // [-] samples, a tick apart, the last for each tick after it
+  int silent = 0;                     // [-] ticks after the last sample
+  Vec6 static_counts = Vec6::Zero();  // [count] of each sample more than of the one before
+
+  Tick() {
+    sample.sequence = 0;
+    sample.switches = kPanicButtonClosed | kFloorMatClosed;
+    sample.adc[kWrenchChannels] = (config.safety.pressure_min + config.safety.pressure_max) / 2;
+    sample.legs = legCounts(config.legs, proposal.legs.L);
+  }
+  Tripped tripped() const {
+    SampleStream samples(config.period);
+    LegEstimator legs(config);
+    SafetyMonitor monitor(config.safety, config.geometry, kPeriod);
+    const LegCommander commander(config);
+    Sample s = sample;
+    for (int i = 0; i < fresh + silent; ++i) {
+      if (i < fresh && i > 0) ++s.sequence;
+      s.time = s.legs_time = s.wrench_time = s.joints_time = i * config.period;
+      samples.update(s, s.time, true, conflict);
+      legs.update(samples, elapsed, true, commander);
+      monitor.watch(elapsed, samples, i * static_counts);
+    }
+    return monitor.check(proposal, {context, samples, legs, {}, oscillation, conflict}).tripped();
+  }
+};
+
+/// Spoils what `check` alone is there for.
+void spoil(Tick& t, Check check) {
+  SafetyLimits& limits = t.config.safety;
+  switch (check) {
+    case Check::kPanicButton: t.sample.switches &= ~kPanicButtonClosed; return;
+    case Check::kFloorMat: t.sample.switches &= ~kFloorMatClosed; return;
+    case Check::kFinite: t.proposal.x.x_ddot(2) = kNan; return;
+    case Check::kStale: t.silent = limits.stale_ticks + 1; return;
+    case Check::kDevice: t.sample.faults = kRobotPiece; return;
+    case Check::kOverrun: t.elapsed.missed = limits.stall_ticks + 1; return;
+    case Check::kLeftAlone: limits.alone = 0.5 * kPeriod; return;
+    case Check::kLegReading: limits.reading_patience = -1; return;
+    case Check::kForwardKinematics: t.sample.legs = {0, 16383, 0, 16383, 0, 16383}; return;
+    case Check::kPositionError: t.context.expected(3) += 2.0 * limits.position_error; return;
+    case Check::kPressure: t.sample.adc[kWrenchChannels] = limits.pressure_max + 1; return;
+    case Check::kSensorSaturated: t.sample.adc[2] = 32767; return;
+    case Check::kSensorFrozen:
+      t.fresh = limits.frozen_samples + 2;
+      t.static_counts(0) = limits.frozen_counts;
+      return;
+    case Check::kOscillation: limits.growing_windows = 0; return;
+    case Check::kMotionLimits: limits.translation = -1.0; return;
+    case Check::kActuatorLimits: limits.leg_max = 0.0; return;
+    case Check::kJointLimits: limits.joint_cone = kNan; return;
+    case Check::kCollide: limits.leg_clearance = 10.0; return;
+    case Check::kConditioning: limits.condition = 1.0; return;
+    case Check::kVelocity: limits.leg_velocity = -1.0; return;
+    case Check::kFlow: limits.flow = -1.0; return;
+    case Check::kConflictingNode: t.conflict = true; return;
+    case Check::kCount: return;
+  }
+}
+
+TEST(SafetyMonitor, AsksEveryCheck) {
+  EXPECT_FALSE(Tick().tripped().any()) << name(Tick().tripped().first());
+  for (const CheckMeaning& one : kChecks) {
+    Tick tick;
+    spoil(tick, one.check);
+    EXPECT_TRUE(tick.tripped().has(one.check)) << one.name;
+    // What has no pose has no length either.
+    if (one.check == Check::kForwardKinematics) continue;
+    EXPECT_EQ(tick.tripped().bits(), 1u << static_cast<unsigned>(one.check)) << one.name;
+  }
+}
+
+TEST(SafetyMonitor, TheLimitsOfACheckAreKeys) {
+  SafetyLimits l;
+  std::set<std::string> keys;
+  std::apply([&](const auto&... limit) { (keys.insert(limit.key), ...); }, limits(l, 1.0));
+  for (const CheckMeaning& one : kChecks) {
+    std::istringstream words{std::string(one.limits)};
+    for (std::string key; words >> key;) EXPECT_TRUE(keys.count(key)) << one.name << ": " << key;
+  }
+}
+
 TEST(SafetyMonitor, NothingThatIsNotFinitePasses) {
   const ControllerConfig c = experiment("puma_on_table_4_1").controller;
   const Proposal good = inverseKinematics(c.geometry, {atRest(Vec6::Zero())});
@@ -223,9 +316,8 @@ TEST(SafetyMonitor, NothingThatIsNotFinitePasses) {
     SampleStream samples(c.period);
     samples.update(sample, 0, false, false);
     const SafetyMonitor monitor(c.safety, c.geometry, kPeriod);
-    return !monitor
-                .check(p, {good.legs.L, good.legs.L}, samples, LegEstimator(c), dynamic,
-                       Oscillation(), false)
+    const LegContext context{good.legs.L, good.legs.L};
+    return !monitor.check(p, {context, samples, LegEstimator(c), dynamic, Oscillation(), false})
                 .tripped()
                 .has(Check::kFinite);
   };

@@ -44,7 +44,9 @@ TEST_P(Causes, StopAloneAndByName) {
   EXPECT_EQ(rig.state().cause, GetParam().check) << name(rig.state().cause);
   EXPECT_EQ(rig.state().latched.bits(), 1u << static_cast<unsigned>(GetParam().check));
   EXPECT_LE(rig.state().cause_tick - injected, GetParam().within);
-  EXPECT_EQ(rig.state().phase, freezes(GetParam().check) ? Phase::kStopped : Phase::kStopping);
+  EXPECT_EQ(rig.state().phase, Tripped(1u << static_cast<unsigned>(GetParam().check)).freeze()
+                                   ? Phase::kStopped
+                                   : Phase::kStopping);
   EXPECT_EQ(rig.until(Phase::kStopped).phase, Phase::kStopped);
   EXPECT_EQ(rig.state().cause, GetParam().check);
   EXPECT_FALSE(rig.state().command.park);

@@ -427,7 +427,7 @@ Checked checked(const ControllerConfig& c, const LegMotion& legs, double ahead =
   LegEstimator estimator(c);
   const Vec6& measured = estimator.update(samples, {}, false, LegCommander(c)).L;
   return SafetyMonitor(c.safety, c.geometry, c.periodSeconds())
-      .check(p, {legs.L, measured}, samples, estimator, {}, Oscillation(), false);
+      .check(p, {{legs.L, measured}, samples, estimator, {}, Oscillation(), false});
 }
 
 struct Sender {

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "ves/control/path_checks.hpp"
+
 namespace ves {
 namespace {
 
@@ -13,17 +15,6 @@ Vec3 legAxis(const Geometry& g, const Transform& X_IP, std::size_t i) {
 
 double angleBetween(const Vec3& a, const Vec3& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b));
-}
-
-/// The first check of a pose that fails; kCount when none does.
-Check failing(const Geometry& g, const SafetyLimits& limits, const JointAxes& axes,
-              const Transform& X_IP) {
-  Tripped tripped;
-  tripped.require(Check::kActuatorLimits, actuatorLimitsCheck(limits, legLengths(g, X_IP)));
-  tripped.require(Check::kJointLimits, axes.check(limits, g, X_IP));
-  tripped.require(Check::kCollide, collideCheck(limits, g, X_IP));
-  tripped.require(Check::kConditioning, conditioningCheck(limits, g, X_IP));
-  return tripped.first();
 }
 
 }  // namespace
@@ -123,10 +114,13 @@ SafetyLimits derivedLimits(const WorkspaceUse& use, const Stroke& legs, const Se
 
 Travel travel(const Geometry& g, const SafetyLimits& limits, int coordinate, double sign,
               double farthest) {
-  const JointAxes axes(g);
+  SafetyLimits free = limits;  // as far as the machine goes
+  free.translation = free.rotation = HUGE_VAL;
+  const PathChecks checks(free, g);
   const auto at = [&](double distance) {
-    const Vec6 x = sign * distance * Vec6::Unit(coordinate);
-    return failing(g, limits, axes, g.fromHome(Pose::from(x)));
+    const Pose x = Pose::from(sign * distance * Vec6::Unit(coordinate));
+    const Transform X_IP = g.fromHome(x);
+    return checks.pose(X_IP, x, legLengths(g, X_IP)).first();
   };
   constexpr int kSteps = 200, kHalvings = 30;
   double good = 0.0;

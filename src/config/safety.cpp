@@ -30,6 +30,29 @@ void requireHome(const Section& s, const SafetyLimits& l, const Geometry& geomet
     s.fail("condition_number", fmt::format("it is {:.3g} at home, want more than that", condition));
 }
 
+void readLimit(Section& s, const Limit<double>& limit, double derived) {
+  if (!std::isnan(limit.before) && !s.has(limit.key)) {
+    limit.value = limit.before;
+    return;
+  }
+  const double shown = limit.derives
+                           ? s.numberOr(limit.key, limit.least, limit.most, derived / limit.unit)
+                           : s.number(limit.key, limit.least, limit.most);
+  limit.value = shown * limit.unit;
+}
+
+/// A number of something, or of the converter's counts for a voltage.
+void readLimit(Section& s, const Limit<int>& limit, int) {
+  if (!std::isnan(limit.before) && !s.has(limit.key))
+    limit.value = static_cast<int>(limit.before);
+  else if (limit.unit == 1.0)
+    limit.value =
+        static_cast<int>(s.integer(limit.key, std::llround(limit.least), std::llround(limit.most)));
+  else
+    limit.value =
+        static_cast<int>(std::lround(s.number(limit.key, limit.least, limit.most) * limit.unit));
+}
+
 }  // namespace
 
 WorkspaceUse readWorkspace(Section s, const Geometry& geometry) {
@@ -43,48 +66,12 @@ SafetyLimits readSafety(Section s, const Geometry& geometry, const WorkspaceUse&
       derivedLimits(use, {legs.actuator.length_min, legs.actuator.length_max},
                     plant::nominalServo(legs.gains, legs.actuator, legs.transducer));
   SafetyLimits l;
-  l.leg_velocity = s.numberOr("leg_velocity_m_per_s", kTiny, 10.0, derived.leg_velocity);
-  l.position_error = s.numberOr("position_error_m", kTiny, 10.0, derived.position_error);
-  l.position_error_still =
-      s.numberOr("position_error_still_m", kTiny, 10.0, derived.position_error_still);
-  l.position_error_lag = s.numberOr("position_error_lag_s", 0.0, 10.0, derived.position_error_lag);
-  l.reading_jump = s.numberOr("reading_jump_m", kTiny, 10.0, derived.reading_jump);
-  // Logs from before these were keys lack them, and ran with these numbers.
-  const auto known = [&](const char* key, double lo, double hi, double before) {
-    return s.has(key) ? s.number(key, lo, hi) : before;
-  };
-  l.reading_speed = known("reading_speed", 1.0, 100.0, 1.5);
-  l.speed_memory = known("speed_memory_s", 0.01, 100.0, 0.3);
-  l.reading_patience = static_cast<int>(known("reading_patience", 0.0, 100.0, 1.0));
-  l.window = known("growth_window_s", 0.01, 100.0, 0.5);
-  l.window_growth = known("window_growth", 1.0, 100.0, 1.2);
-  l.translation = s.number("translation_m", kTiny, 10.0);
-  l.rotation = s.number("rotation_deg", kTiny, 85.0) * kDegree;
-  l.leg_min = s.numberOr("leg_min_m", kTiny, 20.0, derived.leg_min);
-  l.leg_max = s.numberOr("leg_max_m", l.leg_min, 20.0, derived.leg_max);
-  l.joint_cone = s.numberOr("joint_cone_deg", kTiny, 180.0, derived.joint_cone / kDegree) * kDegree;
-  l.leg_clearance = s.numberOr("leg_clearance_m", 0.0, 10.0, derived.leg_clearance);
-  l.plate_angle = s.numberOr("plate_angle_deg", 0.0, 80.0, derived.plate_angle / kDegree) * kDegree;
-  l.condition = s.numberOr("condition_number", 1.0, 1e9, derived.condition);
-  constexpr double kSquareCentimetre = 1e-4, kLitre = 1e-3;
-  l.bore_area = s.number("bore_area_cm2", kTiny, 1e4) * kSquareCentimetre;
-  l.rod_side_area = s.number("rod_side_area_cm2", kTiny, 1e4) * kSquareCentimetre;
-  l.flow = s.number("flow_l_per_s", kTiny, 1e3) * kLitre;
-  l.stale_ticks = static_cast<int>(s.integer("stale_ticks", 0, 1000));
-  l.stall_ticks = static_cast<int>(s.integer("stall_ticks", 0, 1000));
-  l.overruns = static_cast<int>(s.integer("overruns_per_second", 0, kMostOverruns));
-  const auto counts = [&](const char* key) {
-    return static_cast<int>(std::lround(s.number(key, -10.0, 10.0) / volts_per_count));
-  };
-  l.pressure_min = counts("pressure_min_v");
-  l.pressure_max = counts("pressure_max_v");
-  l.frozen_samples = static_cast<int>(s.integer("frozen_samples", 1, 1000));
-  l.frozen_counts = s.number("frozen_counts", 0.0, 65536.0);
-  l.growing_windows = static_cast<int>(s.integer("growing_windows", 1, 1000));
-  l.growth_floor = s.number("growth_floor_j", 0.0, 1e6);
-  l.tool_singularity = known("tool_singularity", 0.0, 1.0, 0.01);
-  l.start_force = s.number("start_force_n", kTiny, 1e6);
-  l.start_moment = s.number("start_moment_nm", kTiny, 1e6);
+  std::apply(
+      [&](const auto&... derived_limit) {
+        std::apply([&](const auto&... limit) { (readLimit(s, limit, derived_limit.value), ...); },
+                   limits(l, volts_per_count));
+      },
+      limits(derived, volts_per_count));
   requireHome(s, l, geometry);
   s.finish();
   return l;

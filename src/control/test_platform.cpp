@@ -99,8 +99,8 @@ Checked TestPlatform::safetyChecks(const Proposal& next, const Wrench& dynamic,
     context.last = commander_.legs().L;
     context.expected = commander_.expected(share_.value());
   }
-  return safety_.check(next, context, samples_, legs_, dynamic, motion_.admittance().oscillation(),
-                       conflict);
+  return safety_.check(
+      next, {context, samples_, legs_, dynamic, motion_.admittance().oscillation(), conflict});
 }
 
 void TestPlatform::legCommunication(const Checked& next) noexcept {

@@ -73,6 +73,21 @@ std::string saturated(const Row& row) {
   return {};
 }
 
+/// The limits that a check looks at, as the configuration has them.
+std::string limitsOf(Check check, const Experiment& e) {
+  const std::string keys = fmt::format(" {} ", kChecks[static_cast<std::size_t>(check)].limits);
+  SafetyLimits l = e.controller.safety;
+  std::string out;
+  const auto add = [&](const auto& limit) {
+    if (keys.find(fmt::format(" {} ", limit.key)) == std::string::npos) return;
+    out += fmt::format("{}safety.{} {:.4g}", out.empty() ? "" : ", ", limit.key,
+                       limit.value / limit.unit);
+  };
+  std::apply([&](const auto&... limit) { (add(limit), ...); },
+             limits(l, e.plant.sensor.volts_per_count));
+  return out;
+}
+
 }  // namespace
 
 std::string evidence(Check check, const Row& row, const Experiment& e) {
@@ -82,9 +97,9 @@ std::string evidence(Check check, const Row& row, const Experiment& e) {
     case Check::kMotionLimits: return coordinateOutside(row, limits);
     case Check::kCollide: return legsTooClose(row, e);
     case Check::kPositionError: return legBehind(row, limits);
-    case Check::kPressure: return row.has_sample ? pressure(row, e) : "";
+    case Check::kPressure: return row.has_sample ? pressure(row, e) : limitsOf(check, e);
     case Check::kSensorSaturated: return row.has_sample ? saturated(row) : "";
-    default: return {};
+    default: return limitsOf(check, e);
   }
 }
 

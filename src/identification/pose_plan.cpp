@@ -6,6 +6,7 @@
 #include <random>
 #include <stdexcept>
 
+#include "ves/control/path_checks.hpp"
 #include "ves/math/dense.hpp"
 
 namespace ves {
@@ -22,7 +23,7 @@ class Planner {
       : setup_(setup),
         combinations_(combinations),
         controller_(controller),
-        axes_(controller.geometry),
+        checks_(controller.safety, controller.geometry),
         masses_(massParameters(setup.robot)),
         start_(start),
         options_(options),
@@ -79,13 +80,7 @@ class Planner {
                      0.0);
       const Pose x{Vec3::Zero(), rpy};
       const Transform X_IP = controller_.geometry.fromHome(x);
-      const SafetyLimits& limits = controller_.safety;
-      if (motionLimitsCheck(limits, x) &&
-          actuatorLimitsCheck(limits, legLengths(controller_.geometry, X_IP)) &&
-          axes_.check(limits, controller_.geometry, X_IP) &&
-          collideCheck(limits, controller_.geometry, X_IP) &&
-          conditioningCheck(limits, controller_.geometry, X_IP))
-        return rpy;
+      if (!checks_.pose(X_IP, x, legLengths(controller_.geometry, X_IP)).any()) return rpy;
     }
     throw std::domain_error("no attitude within this tilt keeps the safety limits");
   }
@@ -169,7 +164,7 @@ class Planner {
   const StaticSetup& setup_;
   const SeparableCombinations& combinations_;
   const ControllerConfig& controller_;
-  JointAxes axes_;
+  PathChecks checks_;
   VectorXd masses_;
   JointVector start_;
   PosePlanOptions options_;

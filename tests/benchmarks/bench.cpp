@@ -166,26 +166,14 @@ BENCHMARK(AdmittanceStep)->Arg(6)->Arg(20)->Arg(132);
 
 void SafetyChecks(benchmark::State& state) {  // those of pose and lengths
   const Experiment e = experiment("puma_on_table_4_1");
-  const SafetyLimits& limits = e.controller.safety;
   const Geometry& g = e.controller.geometry;
-  const JointAxes axes(g);
+  const PathChecks checks(e.controller.safety, g);
   Pose x{{0.1, 0.05, -0.1}, {0.1, -0.1, 0.2}};
   const Transform X = g.fromHome(x);
   const Vec6 L = legLengths(g, X), L_last = L - Vec6::Constant(1e-3);
-  const AdcCounts adc{};
   for (auto _ : state) {
     benchmark::DoNotOptimize(x);
-    Tripped t;
-    t.require(Check::kMotionLimits, motionLimitsCheck(limits, x));
-    t.require(Check::kActuatorLimits, actuatorLimitsCheck(limits, L));
-    t.require(Check::kJointLimits, axes.check(limits, g, X));
-    t.require(Check::kCollide, collideCheck(limits, g, X));
-    t.require(Check::kConditioning, conditioningCheck(limits, g, X));
-    t.require(Check::kVelocity, velocityCheck(limits, L, L_last, 0.01));
-    t.require(Check::kFlow, flowLimitsCheck(limits, L, L_last, 0.01));
-    t.require(Check::kPositionError, positionErrorCheck(limits, L, L_last, L_last));
-    t.require(Check::kPressure, pressureCheck(limits, adc));
-    t.require(Check::kSensorSaturated, saturationCheck(adc));
+    Tripped t = checks.pose(X, x, L) | checks.step(L, L_last, 0.01);
     benchmark::DoNotOptimize(t);
   }
 }

@@ -3,6 +3,7 @@
 // The names of the safety checks (Appendix C), what a failing one does, and a set of them.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <string_view>
 
@@ -35,11 +36,59 @@ enum class Check : std::uint32_t {
   kCount
 };
 
-std::string_view name(Check check) noexcept;
+/// What a trip does: hold the last checked lengths at once, or, for faults that leave the planned
+/// path safe, brake along the motion first.
+enum class Reaction { kFreeze, kBrake };
 
-/// What a trip does. A freeze holds the last checked lengths at once. A controlled stop brakes
-/// along the motion first: for faults that leave the planned path safe.
-bool freezes(Check check) noexcept;
+/// Of one check.
+struct CheckMeaning {
+  Check check;
+  std::string_view name;
+  Reaction reaction;
+  std::string_view limits;  // the keys of `safety` that it looks at, by spaces
+};
+
+/// One line a check, in the order of Check.
+inline constexpr CheckMeaning kChecks[] = {
+    {Check::kPanicButton, "panic button", Reaction::kFreeze, ""},
+    {Check::kFloorMat, "floor mat", Reaction::kFreeze, ""},
+    {Check::kFinite, "finite numbers", Reaction::kFreeze, ""},
+    {Check::kStale, "sample age", Reaction::kBrake, "stale_ticks"},
+    {Check::kDevice, "device fault", Reaction::kBrake, ""},
+    {Check::kOverrun, "tick overrun", Reaction::kBrake, "stall_ticks overruns_per_second"},
+    {Check::kLeftAlone, "legs left alone", Reaction::kFreeze, ""},
+    {Check::kLegReading, "leg reading", Reaction::kFreeze,
+     "reading_jump_m reading_speed reading_patience"},
+    {Check::kForwardKinematics, "forward kinematics", Reaction::kFreeze, ""},
+    {Check::kPositionError, "position error", Reaction::kFreeze,
+     "position_error_still_m position_error_lag_s position_error_m"},
+    {Check::kPressure, "pressure", Reaction::kBrake, "pressure_min_v pressure_max_v"},
+    {Check::kSensorSaturated, "sensor saturated", Reaction::kBrake, ""},
+    {Check::kSensorFrozen, "sensor frozen", Reaction::kBrake, "frozen_samples frozen_counts"},
+    {Check::kOscillation, "growing oscillation", Reaction::kBrake,
+     "growing_windows growth_window_s window_growth growth_floor_j"},
+    {Check::kMotionLimits, "motion limits", Reaction::kFreeze, "translation_m rotation_deg"},
+    {Check::kActuatorLimits, "actuator limits", Reaction::kFreeze, "leg_min_m leg_max_m"},
+    {Check::kJointLimits, "joint limits", Reaction::kFreeze, "joint_cone_deg"},
+    {Check::kCollide, "collide", Reaction::kFreeze, "leg_clearance_m plate_angle_deg"},
+    {Check::kConditioning, "conditioning", Reaction::kFreeze, "condition_number"},
+    {Check::kVelocity, "velocity", Reaction::kFreeze, "leg_velocity_m_per_s"},
+    {Check::kFlow, "flow limits", Reaction::kFreeze, "flow_l_per_s"},
+    {Check::kConflictingNode, "second controller or machine", Reaction::kFreeze, ""},
+};
+static_assert(
+    [] {
+      std::uint32_t n = 0;
+      for (const CheckMeaning& c : kChecks)
+        if (static_cast<std::uint32_t>(c.check) != n++ || c.name.empty()) return false;
+      return n == static_cast<std::uint32_t>(Check::kCount);
+    }(),
+    "each check has a line in kChecks, in the order of Check");
+
+/// "none" of kCount.
+constexpr std::string_view name(Check check) noexcept {
+  return check < Check::kCount ? kChecks[static_cast<std::size_t>(check)].name : "none";
+}
 
 /// A set of tripped checks.
 class Tripped {
@@ -61,9 +110,19 @@ class Tripped {
       if (has(static_cast<Check>(i))) f(static_cast<Check>(i));
   }
   /// One of them freezes.
-  bool freeze() const noexcept;
+  bool freeze() const noexcept {
+    bool any = false;
+    forEach([&](Check c) {
+      any = any || kChecks[static_cast<std::size_t>(c)].reaction == Reaction::kFreeze;
+    });
+    return any;
+  }
   /// The tripped check of highest priority; kCount when none.
-  Check first() const noexcept;
+  Check first() const noexcept {
+    Check first = Check::kCount;
+    forEach([&](Check c) { first = std::min(first, c); });
+    return first;
+  }
 
   Tripped operator|(Tripped other) const noexcept { return Tripped(bits_ | other.bits_); }
 

@@ -84,7 +84,7 @@ enum class Refusal : std::int32_t {
   kUnassessed,      // the stability of this loop was not checked
   kChecking,        // not refused yet: its path is being checked, over some ticks
   kOvertaken,       // a hold, a stop or a failing check came before it began
-  kTooLong,         // the loop grows, slowly: longer than the program's segments it was not let pass
+  kTooLong,  // the loop grows, slowly: longer than the program's segments it was not let pass
   kCount
 };
 

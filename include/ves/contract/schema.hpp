@@ -12,6 +12,7 @@
 #include <concepts>
 #include <tuple>
 
+#include "ves/contract/members.hpp"
 #include "ves/contract/setup.hpp"
 #include "ves/contract/tick_state.hpp"
 
@@ -235,19 +236,6 @@ constexpr auto fields(S& s) {
   };
 }
 
-/// Fits any member.
-struct Any {
-  template <typename T>
-  operator T() const;
-};
-/// [-] members of a struct without constructors.
-template <typename S, typename... A>
-consteval int members() {
-  if constexpr (requires { S{A{}..., Any{}}; })
-    return members<S, A..., Any>();
-  else
-    return sizeof...(A);
-}
 static_assert(members<Sample>() == 15 && members<LegCommand>() == 7 &&
                   members<MachineSetup>() == 17 && members<TickState>() == 48,
               "a member has come or gone: describe it above, and count it here");

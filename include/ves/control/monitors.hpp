@@ -54,9 +54,6 @@ class FrozenSensor {
   double change_ = 0.0;  // [count] of the expected since then
 };
 
-/// [-] safety.overruns_per_second, at most.
-inline constexpr int kMostOverruns = 1000;
-
 /// Ticks that came late: woke late, or the one before ran long. Never made up for.
 class Overruns {
  public:

@@ -5,49 +5,12 @@
 #pragma once
 
 #include <array>
-#include <cstdint>
 
 #include "ves/contract/check.hpp"
 #include "ves/contract/sample.hpp"
+#include "ves/control/safety_limits.hpp"
 
 namespace ves {
-
-struct SafetyLimits {
-  double leg_velocity = 0.0;          // [m/s] commanded
-  double position_error = 0.0;        // [m] commanded minus measured length, at most
-  double position_error_still = 0.0;  // [m] the same, of a leg at rest
-  double position_error_lag = 0.0;    // [s] and so much more per speed of the leg
-  double reading_jump = 0.0;          // [m] of a leg at rest, from one sample to the next,
-  double reading_speed = 1.0;         // [-] and so much more, times the speed it had lately;
-  double speed_memory = 1.0;          // [s] over which that speed is forgotten
-  int reading_patience = 0;           // [-] readings in a row that may be impossible
-  double translation = 0.0;           // [m] of each coordinate from home
-  double rotation = 0.0;              // [rad] of each coordinate from home
-  double leg_min = 0.0;               // [m]
-  double leg_max = 0.0;               // [m]
-  double joint_cone = 0.0;            // [rad] half angle about a joint's own axis
-  double leg_clearance = 0.0;         // [m] least distance between the axes of two legs
-  double plate_angle = 0.0;           // [rad] least angle between a leg and a plate
-  double condition = 0.0;             // [-] largest condition number of the Jacobian
-  double bore_area = 0.0;             // [m^2] fed when a leg extends
-  double rod_side_area = 0.0;         // [m^2] fed when it retracts
-  double flow = 0.0;                  // [m^3/s] of one leg
-  int stale_ticks = 0;                // [-] ticks without a new sample
-  int stall_ticks = 0;                // [-] ticks missed in a row
-  double alone = HUGE_VAL;            // [s] without a command before the legs go by themselves
-  int overruns = 0;                   // [-] late ticks in one second
-  int pressure_min = 0;               // [count]
-  int pressure_max = 0;               // [count]
-  int frozen_samples = 0;             // [-] with six identical readings
-  double frozen_counts = 0.0;         // [count] by which the weight should have changed one of them
-  int growing_windows = 0;            // [-] in a row, each with more energy than the last
-  double window = 1.0;                // [s] of these,
-  double window_growth = 1.0;         // [-] more than this is growth,
-  double growth_floor = 0.0;          // [J] below which nothing is said
-  double tool_singularity = 0.0;  // [-] of the simulated robot, where its tool paths are refused
-  double start_force = 0.0;   // [N] measured, gravity compensated, when admittance control begins
-  double start_moment = 0.0;  // [N m]
-};
 
 /// Successive commanded lengths differ by no more than leg_velocity allows in one period.
 bool velocityCheck(const SafetyLimits&, const Vec6& L, const Vec6& L_last, double period) noexcept;

@@ -15,6 +15,16 @@ struct LegContext {
   Vec6 expected;  // where they should be now
 };
 
+/// What the checks of a tick look at, beside their own memories.
+struct Findings {
+  const LegContext& context;
+  const SampleStream& samples;
+  const LegEstimator& legs;
+  const Wrench& dynamic;
+  const Oscillation& oscillation;
+  bool conflict;  // another node was heard on the bus
+};
+
 class SafetyMonitor {
  public:
   SafetyMonitor(const SafetyLimits& limits, const Geometry& geometry, double period)
@@ -25,15 +35,15 @@ class SafetyMonitor {
   void watch(const Elapsed& elapsed, const SampleStream& samples,
              const Vec6& static_counts) noexcept;
 
-  /// Every check of Appendix C and beyond, of what would be commanded. `conflict`: another node
-  /// was heard on the bus.
-  Checked check(const Proposal& proposal, const LegContext& context, const SampleStream& samples,
-                const LegEstimator& legs, const Wrench& dynamic, const Oscillation& oscillation,
-                bool conflict) const noexcept;
+  /// Every check of Appendix C and beyond, of what would be commanded.
+  Checked check(const Proposal& proposal, const Findings& now) const noexcept;
 
   const PathChecks& path() const noexcept { return checks_; }
 
  private:
+  /// The requirement of one check; `path`: what of the path fails.
+  bool holds(Check check, const Proposal& p, const Findings& now, Tripped path) const noexcept;
+
   PathChecks checks_;
   double period_;  // [s]
   FrozenSensor frozen_;
