@@ -10,8 +10,8 @@
 #include "support/robots.hpp"
 #include "ves/console/command.hpp"
 #include "ves/console/form.hpp"
-#include "ves/realtime/realtime.hpp"
 #include "ves/faults/bus_observer.hpp"
+#include "ves/realtime/realtime.hpp"
 
 namespace ves {
 namespace {
@@ -43,12 +43,12 @@ TEST(Command, TrajectoryTakesEachCoordinateInMillimetresAndDegrees) {
   const Segment& s = c.order.segment;
   EXPECT_EQ(s.kind, SegmentKind::kTrajectory);
   EXPECT_EQ(s.duration, 3.0);
-  EXPECT_EQ(s.trajectory[2].motion, AxisMotion::kSine);
-  EXPECT_NEAR(s.trajectory[2].amplitude, 0.2, 1e-15);
-  EXPECT_EQ(s.trajectory[2].frequency, 0.5);
-  EXPECT_EQ(s.trajectory[5].motion, AxisMotion::kRamp);
-  EXPECT_NEAR(s.trajectory[5].final, -6.0 * M_PI / 180.0, 1e-15);
-  for (std::size_t i : {0u, 1u, 3u, 4u}) EXPECT_EQ(s.trajectory[i].motion, AxisMotion::kHold);
+  EXPECT_EQ(s.trajectory.motion[2], AxisMotion::kSine);
+  EXPECT_NEAR(s.trajectory.amplitude(2), 0.2, 1e-15);
+  EXPECT_EQ(s.trajectory.frequency(2), 0.5);
+  EXPECT_EQ(s.trajectory.motion[5], AxisMotion::kRamp);
+  EXPECT_NEAR(s.trajectory.final(5), -6.0 * M_PI / 180.0, 1e-15);
+  for (std::size_t i : {0u, 1u, 3u, 4u}) EXPECT_EQ(s.trajectory.motion[i], AxisMotion::kHold);
 }
 
 TEST(Command, MoveRobotAndCollect) {
@@ -290,7 +290,7 @@ TEST_F(Console, OrdersOverTheBusAreForOneController) {
   ASSERT_TRUE(w.until([&] { return w.states > 20; }));
   const Identity me = Identity::draw();
   const auto order = [&](Request request, std::int64_t to, std::int64_t sequence) {
-    w.bus.publish(channel::kOperator, toMessage({request, {}, {}}, to, header(me, sequence, 0)));
+    w.bus.publish(channel::kOperator, toMessage({request, {}, {}, to}, header(me, sequence, 0)));
   };
   // As a played log would: meant for a controller that is no more.
   order(Request::kArm, w.controller + 1, 0);

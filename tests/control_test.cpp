@@ -276,9 +276,9 @@ TEST(Modes, KeepDampingThatCouples) {
 // --- Trajectory generation, leg communication ---------------------------------------------------
 
 TEST(TrajectoryGeneration, RampsAndSinesAreTheReportsEquations) {
-  Trajectory trajectory{};
-  trajectory[0] = {AxisMotion::kRamp, 0.2, 0.0, 0.0};
-  trajectory[2] = {AxisMotion::kSine, 0.0, 0.1, 0.5};
+  Trajectory trajectory = test::sine(2, 0.1, 0.5, 1.0).trajectory;
+  trajectory.motion[0] = AxisMotion::kRamp;
+  trajectory.final(0) = 0.2;
   Vec6 initial;
   initial << 0.05, 0.01, -0.02, 0.0, 0.0, 0.3;
   const std::int64_t N = 250;
@@ -294,9 +294,9 @@ TEST(TrajectoryGeneration, RampsAndSinesAreTheReportsEquations) {
 }
 
 TEST(TrajectoryGeneration, RatesAreDerivatives) {
-  Trajectory trajectory{};
-  trajectory[0] = {AxisMotion::kRamp, 0.2, 0.0, 0.0};
-  trajectory[4] = {AxisMotion::kSine, 0.0, 0.3, 1.5};
+  Trajectory trajectory = test::sine(4, 0.3, 1.5, 1.0).trajectory;
+  trajectory.motion[0] = AxisMotion::kRamp;
+  trajectory.final(0) = 0.2;
   const auto at = [&](std::int64_t n) {
     return trajectoryGeneration(trajectory, Vec6::Zero(), n, 100000, 1e-5);
   };

@@ -302,7 +302,7 @@ TEST(SafetyMonitor, AsksEveryCheck) {
 TEST(SafetyMonitor, TheLimitsOfACheckAreKeys) {
   SafetyLimits l;
   std::set<std::string> keys;
-  std::apply([&](const auto&... limit) { (keys.insert(limit.key), ...); }, limits(l, 1.0));
+  std::apply([&](const auto&... limit) { (keys.insert(limit.key), ...); }, limitTable(l, 1.0));
   for (const CheckMeaning& one : kChecks) {
     std::istringstream words{std::string(one.limits)};
     for (std::string key; words >> key;) EXPECT_TRUE(keys.count(key)) << one.name << ": " << key;

@@ -107,6 +107,17 @@ MachineSetup filledSetup() {
   return s;
 }
 
+Order filledOrder() {
+  auto o = filled<Order>();
+  o.request = Request::kRun;
+  o.id = {1, 3};
+  Segment& s = o.segment;
+  s.target = Pose::from(0.1 * s.target.stacked());
+  s.trajectory.final *= 0.1;
+  s.trajectory.amplitude *= 0.1;
+  return o;
+}
+
 template <typename Message>
 std::vector<std::uint8_t> bytesOf(const Message& m) {
   std::vector<std::uint8_t> bytes(static_cast<std::size_t>(m.getEncodedSize()));
@@ -137,6 +148,18 @@ TEST(Schema, EveryFieldComesOutOfItsMessage) {
   goes(filled<LegCommand>(), toMessage(filled<LegCommand>(), header({1, 2}, 3, 4)));
   goes(filledSetup(), toMessage(filledSetup(), header({1, 2}, 3, 4)));
   goes(filled<TickState>(), toMessage(filled<TickState>(), header({1, 2}, 3, 4)));
+  goes(filledOrder(), toMessage(filledOrder(), header({1, 2}, 3, 4)));
+}
+
+TEST(Schema, WhatAnOrderDoesNotNeedCannotMakeItUnheard) {
+  operator_t m = toMessage(filledOrder(), header({1, 2}, 3, 4));
+  m.request = static_cast<int>(Request::kHold);
+  m.kind = m.motion[3] = 99;
+  m.duration = m.final[2] = NAN;
+  const auto order = fromMessage(m);
+  ASSERT_TRUE(order);
+  EXPECT_EQ(order->request, Request::kHold);
+  EXPECT_EQ(order->controller, m.controller);
 }
 
 TEST(Schema, AStateThatNamesNoSuchPhaseIsNone) {

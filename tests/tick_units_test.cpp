@@ -405,8 +405,7 @@ TEST(Rehearsal, NamesTheCheckThatAStepByStepWalkMeetsSomePosesATick) {
   EXPECT_EQ(failure(test::sine(2, 0.2, 0.5, 4.0)), Check::kCount);
   EXPECT_EQ(failure(test::sine(2, 0.31, 0.1, 10.0)), Check::kMotionLimits);
   EXPECT_EQ(failure(test::sine(2, 0.2, 3.0, 4.0)), Check::kVelocity);
-  Segment ramp = test::segment(SegmentKind::kTrajectory, 2.0);
-  ramp.trajectory[0] = {AxisMotion::kRamp, 0.29, 0.0, 0.0};
+  Segment ramp = test::ramp(0, 0.29, 2.0);
   EXPECT_EQ(failure(ramp), Check::kCount);
   ramp.duration = 0.2;  // the same way, too fast
   EXPECT_EQ(failure(ramp), Check::kVelocity);
@@ -595,8 +594,8 @@ TEST(Rehearsal, LooksAtTheLastPoseWhateverTheStride) {
   // The ramp's last tick alone leaves the workspace.
   const ControllerConfig& c = puma();
   const PathChecks checks(c.safety, c.geometry);
-  Segment ramp = test::segment(SegmentKind::kTrajectory, 29.99);  // 2999 periods: every second one
-  ramp.trajectory[2] = {AxisMotion::kRamp, c.safety.translation + 5e-5, 0.0, 0.0};
+  // 2999 periods: every second one
+  const Segment ramp = test::ramp(2, c.safety.translation + 5e-5, 29.99);
   const PathPoint<6> home = atRest(Vec6::Zero());
   Rehearsal rehearsal;
   rehearsal.begin(MotionPlan::of({c.periodSeconds(), c.gentle}, ramp, home),

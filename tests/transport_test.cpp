@@ -7,6 +7,7 @@
 
 #include "support/ether.hpp"
 #include "support/refusal.hpp"
+#include "support/rig.hpp"
 #include "ves/bus/bus.hpp"
 #include "ves/bus/channels.hpp"
 #include "ves/bus/fields.hpp"
@@ -118,8 +119,8 @@ TEST(Gate, LetsNothingOutOfRangeIn) {
     Order order;
     order.request = Request::kRun;
     order.segment.duration = 3.0;
-    order.segment.trajectory[2] = {AxisMotion::kSine, 0.0, 0.2, 0.5};
-    operator_t m = toMessage(order, 9, header({1, 2}, 7, 0));
+    order.segment.trajectory = test::sine(2, 0.2, 0.5, 1.0).trajectory;
+    operator_t m = toMessage(order, header({1, 2}, 7, 0));
     change(m);
     return fromMessage(m);
   };
@@ -127,8 +128,8 @@ TEST(Gate, LetsNothingOutOfRangeIn) {
   ASSERT_TRUE(order);
   EXPECT_EQ(order->id.source, 1);
   EXPECT_EQ(order->id.sequence, 7);
-  EXPECT_EQ(order->segment.trajectory[2].amplitude, 0.2);
-  EXPECT_EQ(order->segment.trajectory[2].motion, AxisMotion::kSine);
+  EXPECT_EQ(order->segment.trajectory.amplitude(2), 0.2);
+  EXPECT_EQ(order->segment.trajectory.motion[2], AxisMotion::kSine);
   for (const auto change : std::initializer_list<void (*)(operator_t&)>{
            [](operator_t& m) { m.request = 0; },
            [](operator_t& m) { m.request = static_cast<int>(Request::kCount); },
@@ -174,7 +175,7 @@ TEST(Link, AHoldOvertakesWhatWaitsAndAllOfItIsAnswered) {
     std::int64_t sequence = 0;
     const auto give = [&](Request request) {
       bus.there.publish(channel::kOperator,
-                        toMessage({request, {}, {}}, 9, header({5, 1}, sequence++, 0)));
+                        toMessage({request, {}, {}, 9}, header({5, 1}, sequence++, 0)));
     };
     give(Request::kArm);
     give(Request::kTare);
@@ -197,9 +198,9 @@ TEST(Link, AHoldFindsRoomWhereTheQueueIsFull) {
   ControllerLink link(bus.here, {9, 9});
   for (std::int64_t sequence = 0; sequence < 40; ++sequence)
     bus.there.publish(channel::kOperator,
-                      toMessage({Request::kTare, {}, {}}, 9, header({5, 1}, sequence, 0)));
+                      toMessage({Request::kTare, {}, {}, 9}, header({5, 1}, sequence, 0)));
   bus.there.publish(channel::kOperator,
-                    toMessage({Request::kHold, {}, {}}, 9, header({5, 1}, 40, 0)));
+                    toMessage({Request::kHold, {}, {}, 9}, header({5, 1}, 40, 0)));
   bus.here.drain();
   EXPECT_EQ(link.takeOrder().request, Request::kHold);
   int waited = 0;

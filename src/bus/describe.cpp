@@ -28,8 +28,9 @@ Shape shapeOf(const Wrench&) { return {"double", 6}; }
 Shape shapeOf(const Pose&) { return {"double", 6}; }
 template <typename E>
 requires std::is_enum_v<E> Shape shapeOf(E) { return {"int32_t", 0}; }
-template <std::size_t N>
-Shape shapeOf(const std::array<std::int32_t, N>&) {
+template <typename E, std::size_t N>
+requires(std::is_enum_v<E> || std::same_as<E, std::int32_t>) Shape
+    shapeOf(const std::array<E, N>&) {
   return {"int32_t", static_cast<int>(N)};
 }
 template <int R, int C>
@@ -53,6 +54,7 @@ std::string meaning(const Field<T>& field) {
   using V = std::remove_const_t<T>;
   std::string out = field.meaning;
   if constexpr (std::is_enum_v<V>) out += numbers("", V::kCount);
+  if constexpr (requires { V::value_type::kCount; }) out += numbers("", V::value_type::kCount);
   if constexpr (std::same_as<V, Tripped>)
     out += numbers("bit ", static_cast<Check>(static_cast<int>(Check::kCount) - 1));
   return out;
@@ -114,14 +116,16 @@ int describe(const std::string& folder) {
           std::ofstream(folder + "/messages.md")};
   out.values << "// The fields of the messages, in the order of contract/schema.hpp.\n"
                 "#pragma once\n\n#include <tuple>\n\n";
-  for (const char* name : {kMessage<Sample>.name, kMessage<LegCommand>.name,
-                           kMessage<MachineSetup>.name, kMessage<TickState>.name})
+  for (const char* name :
+       {kMessage<Sample>.name, kMessage<LegCommand>.name, kMessage<MachineSetup>.name,
+        kMessage<Order>.name, kMessage<TickState>.name})
     out.values << "#include <ves/" << name << ".hpp>\n";
   out.values << "\nnamespace ves {\n\n";
   out.table << "# Messages\n\nEach begins with `header_t header`. Units are SI.\n";
   out.add<Sample>();
   out.add<LegCommand>();
   out.add<MachineSetup>();
+  out.add<Order>();
   out.add<TickState>();
   out.values << "\n}  // namespace ves\n";
   return out.values.flush() && out.table.flush() ? 0 : 2;

@@ -81,24 +81,8 @@ state_t toMessage(const TickState& state, const header_t& header) noexcept {
   return messageOf<state_t>(state, header);
 }
 
-operator_t toMessage(const Order& order, std::int64_t controller, const header_t& header) noexcept {
-  operator_t m;
-  m.header = header;
-  m.controller = controller;
-  m.request = static_cast<std::int32_t>(order.request);
-  const Segment& s = order.segment;
-  m.kind = static_cast<std::int32_t>(s.kind);
-  m.duration = s.duration;
-  m.interval = s.interval;
-  schema::put(s.target, m.target);
-  for (int i = 0; i < 6; ++i) {
-    const Axis& axis = s.trajectory[static_cast<std::size_t>(i)];
-    m.motion[i] = static_cast<std::int32_t>(axis.motion);
-    m.final[i] = axis.final;
-    m.amplitude[i] = axis.amplitude;
-    m.frequency[i] = axis.frequency;
-  }
-  return m;
+operator_t toMessage(const Order& order, const header_t& header) noexcept {
+  return messageOf<operator_t>(order, header);
 }
 
 robot_command_t toMessage(const RobotOrder& order, const header_t& header) noexcept {
@@ -222,19 +206,16 @@ std::optional<RobotOrder> fromMessage(const robot_command_t& m) noexcept {
 
 std::optional<Order> fromMessage(const operator_t& m) noexcept {
   Order order;
-  order.request = static_cast<Request>(m.request);
+  if (m.request == static_cast<std::int32_t>(Request::kRun)) {
+    const std::optional<Order> whole = structOf<Order>(m);
+    if (!whole) return {};
+    order = *whole;
+  } else {  // nothing else of it counts, nor can it make a stop unheard
+    order.request = static_cast<Request>(m.request);
+    order.controller = m.controller;
+  }
   order.id = {m.header.source, m.header.sequence};
-  Segment& s = order.segment;
-  s.kind = static_cast<SegmentKind>(m.kind);
-  s.duration = m.duration;
-  s.interval = m.interval;
-  s.target = Pose::from(Vec6::Map(m.target));
-  for (int i = 0; i < 6; ++i)
-    s.trajectory[static_cast<std::size_t>(i)] = {static_cast<AxisMotion>(m.motion[i]), m.final[i],
-                                                 m.amplitude[i], m.frequency[i]};
-  if (!plausible(order)) return {};
-  if (order.request != Request::kRun) order.segment = {};
-  return order;
+  return ifPlausible(order);
 }
 
 bool wellFormed(const std::string& channel, const void* data, std::int64_t size) {

@@ -2,6 +2,7 @@
 #include "ves/config/base.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -174,35 +175,61 @@ std::shared_ptr<const ArmModes> modesOfArm(const ArmDescription& arm, const ArmM
   return known.of({arm, keep}, [&] { return armModes(model, arm.damping_ratio, keep); });
 }
 
+/// Six modes at most of M, C and K.
+Base readMatrices(Section& s) {
+  const Mat6 M = readMatrix(s, "mass", false);
+  const Mat6 C = readMatrix(s, "damping", true);
+  const Mat6 K = readMatrix(s, "stiffness", true);
+  Base out;
+  out.modes = keep(modesOf(M, C, K), readKeep(s, 6));
+  return out;
+}
+
+Base readModes(Section& s) {
+  const ModalModel all = readTable(s.section("modes"));
+  Base out;
+  out.modes = keep(all, readKeep(s, static_cast<int>(all.stiffness.size())));
+  return out;
+}
+
+Base readArmBase(Section& s) {
+  Section section = s.section("arm");
+  const ArmDescription arm = readArm(section);
+  section.finish();
+  Base out;
+  out.arm = assemble(arm);
+  const int dofs = out.arm->frame.dofs();
+  if (dofs == 0) section.fail("chain", "has nothing that can move");
+  try {
+    const std::shared_ptr<const ArmModes> modes = modesOfArm(arm, *out.arm, readKeep(s, dofs));
+    out.modes = modes->tip;
+    out.shape = modes->shape;
+  } catch (const std::domain_error&) {
+    section.fail("chain",
+                 "a part that can move has no mass; want mass in every beam, or inertia "
+                 "about every axis of a housing at its end");
+  }
+  return out;
+}
+
+/// A kind of base, by the key that says so.
+struct BaseKind {
+  std::string_view key;
+  Base (*read)(Section& s);
+};
+constexpr BaseKind kBases[] = {{"arm", readArmBase}, {"modes", readModes}, {"mass", readMatrices}};
+
 }  // namespace
 
 Base readBase(Section s) {
-  Base out;
-  if (s.has("arm")) {
-    Section section = s.section("arm");
-    const ArmDescription arm = readArm(section);
-    section.finish();
-    out.arm = assemble(arm);
-    const int dofs = out.arm->frame.dofs();
-    if (dofs == 0) section.fail("chain", "has nothing that can move");
-    try {
-      const std::shared_ptr<const ArmModes> modes = modesOfArm(arm, *out.arm, readKeep(s, dofs));
-      out.modes = modes->tip;
-      out.shape = modes->shape;
-    } catch (const std::domain_error&) {
-      section.fail("chain",
-                   "a part that can move has no mass; want mass in every beam, or inertia "
-                   "about every axis of a housing at its end");
-    }
-  } else if (s.has("modes")) {
-    out.modes = readTable(s.section("modes"));
-    out.modes = keep(out.modes, readKeep(s, static_cast<int>(out.modes.stiffness.size())));
-  } else {
-    const Mat6 M = readMatrix(s, "mass", false);
-    const Mat6 C = readMatrix(s, "damping", true);
-    const Mat6 K = readMatrix(s, "stiffness", true);
-    out.modes = keep(modesOf(M, C, K), readKeep(s, 6));
+  const BaseKind* kind = std::find_if(std::begin(kBases), std::end(kBases),
+                                      [&](const BaseKind& one) { return s.has(one.key); });
+  if (kind == std::end(kBases)) {
+    std::vector<std::string_view> keys;
+    for (const BaseKind& one : kBases) keys.push_back(one.key);
+    s.fail("mass", fmt::format("missing, want one of {}", fmt::join(keys, ", ")));
   }
+  const Base out = kind->read(s);
   s.finish();
   return out;
 }

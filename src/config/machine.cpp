@@ -77,24 +77,55 @@ Sensor readSensor(Section s) {
   return out;
 }
 
+namespace {
+
+ForceSensorSource readNetFt(Section& machine) {
+  Section s = machine.section("net_ft");
+  NetFtAddress out;
+  out.host = s.text("host");
+  out.port = static_cast<int>(s.integer("port", 1, 65535));
+  out.http_port = static_cast<int>(s.integer("http_port", 1, 65535));
+  s.finish();
+  return out;
+}
+
+/// What `force_sensor` may say, and who reads the section that goes with it.
+struct ForceSensorKind {
+  std::string_view name;
+  ForceSensorSource (*read)(Section& machine);
+};
+constexpr ForceSensorKind kForceSensors[] = {
+    {"simulated", [](Section&) -> ForceSensorSource { return Simulated{}; }},
+    {"external", [](Section&) -> ForceSensorSource { return External{}; }},
+    {"net_ft", readNetFt},
+};
+static_assert(std::size(kForceSensors) == std::variant_size_v<ForceSensorSource>,
+              "each kind of force sensor has a line in kForceSensors");
+
+/// The sections of those that are not chosen are looked at too.
+ForceSensorSource readForceSensor(Section& machine) {
+  std::vector<std::string_view> names;
+  for (const ForceSensorKind& kind : kForceSensors) names.push_back(kind.name);
+  const std::string chosen = machine.choice("force_sensor", names);
+  ForceSensorSource out;
+  for (const ForceSensorKind& kind : kForceSensors) {
+    const ForceSensorSource one = kind.read(machine);
+    if (kind.name == chosen) out = one;
+  }
+  return out;
+}
+
+}  // namespace
+
 MachinePieces readMachine(Section s) {
   MachinePieces m;
   const auto external = [&](const char* key) {
-    return s.choice(key, {"simulated", "external"}) == "external" ? Source::kExternal
-                                                                  : Source::kSimulated;
+    return s.choice(key, {"simulated", "external"}) == "external";
   };
-  m.legs = external("legs");
-  m.robot = external("robot");
-  m.switches = external("switches");
-  const std::string sensor = s.choice("force_sensor", {"simulated", "external", "net_ft"});
-  m.force_sensor = sensor == "net_ft"     ? Source::kNetFt
-                   : sensor == "external" ? Source::kExternal
-                                          : Source::kSimulated;
-  Section net_ft = s.section("net_ft");
-  m.net_ft.host = net_ft.text("host");
-  m.net_ft.port = static_cast<int>(net_ft.integer("port", 1, 65535));
-  m.net_ft.http_port = static_cast<int>(net_ft.integer("http_port", 1, 65535));
-  net_ft.finish();
+  m.external_legs = external("legs");
+  m.external_robot = external("robot");
+  m.external_switches = external("switches");
+  m.force_sensor = readForceSensor(s);
   m.period = s.integer("sample_period_ns", 200'000, 100'000'000);
   m.follow = s.number("follow_per_s", 1.0, 1e4);
   s.finish();

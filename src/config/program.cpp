@@ -50,8 +50,7 @@ class ProgramReader {
       segment.duration = s.number("duration_s", 0.01, 1e6);
       for (int i = 0; i < 6; ++i) {
         const std::string_view name = coordinate(i).name;
-        if (s.has(name))
-          segment.trajectory[static_cast<std::size_t>(i)] = readAxis(s.section(name), i);
+        if (s.has(name)) readMotion(s.section(name), i, segment.trajectory);
       }
     } else if (kind == "monitor") {
       segment.kind = SegmentKind::kMonitor;
@@ -76,21 +75,21 @@ class ProgramReader {
     segment.duration = static_cast<double>((c.path.cols() - 1) * c.period) * kSecondPerNanosecond;
   }
 
-  static Axis readAxis(Section s, int i) {
-    Axis axis;
-    const std::string kind = s.onlyKey({"ramp", "sine"}, {});
+  static void readMotion(Section s, int i, Trajectory& out) {
+    std::vector<std::string_view> names;
+    for (const MotionMeaning& motion : kMotions)
+      if (motion.motion != AxisMotion::kHold) names.push_back(motion.name);
+    const std::string kind = s.onlyKey(names, {});
+    const auto& meaning = *std::find_if(std::begin(kMotions), std::end(kMotions),
+                                        [&](const MotionMeaning& m) { return m.name == kind; });
+    out.motion[static_cast<std::size_t>(i)] = meaning.motion;
     Section motion = s.section(kind);
-    if (kind == "ramp") {
-      axis.motion = AxisMotion::kRamp;
-      axis.final = readCoordinate(motion, "to", i);
-    } else {
-      axis.motion = AxisMotion::kSine;
-      axis.amplitude = readCoordinate(motion, "amplitude", i);
-      axis.frequency = motion.number("frequency_hz", 0.0, 1e3);
-    }
+    for (const MotionNumber& number : meaning.numbers)
+      if (number.value)
+        (out.*number.value)(i) = number.most > 0.0 ? motion.number(number.key, 0.0, number.most)
+                                                   : readCoordinate(motion, number.key, i);
     motion.finish();
     s.finish();
-    return axis;
   }
 
   void readRobotEvents(Section& item) {

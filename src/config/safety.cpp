@@ -69,9 +69,9 @@ SafetyLimits readSafety(Section s, const Geometry& geometry, const WorkspaceUse&
   std::apply(
       [&](const auto&... derived_limit) {
         std::apply([&](const auto&... limit) { (readLimit(s, limit, derived_limit.value), ...); },
-                   limits(l, volts_per_count));
+                   limitTable(l, volts_per_count));
       },
-      limits(derived, volts_per_count));
+      limitTable(derived, volts_per_count));
   requireHome(s, l, geometry);
   s.finish();
   return l;

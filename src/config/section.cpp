@@ -124,7 +124,7 @@ std::vector<std::string> Section::texts(std::string_view key) {
   return out;
 }
 
-std::string Section::choice(std::string_view key, std::initializer_list<std::string_view> allowed) {
+std::string Section::choice(std::string_view key, const std::vector<std::string_view>& allowed) {
   const Value& value = need(key);
   if (value.kind != Value::Kind::kScalar ||
       std::find(allowed.begin(), allowed.end(), value.text) == allowed.end())
@@ -185,8 +185,8 @@ std::vector<Section> Section::list(std::string_view key) {
   return out;
 }
 
-std::string Section::onlyKey(std::initializer_list<std::string_view> allowed,
-                             std::initializer_list<std::string_view> besides) {
+std::string Section::onlyKey(const std::vector<std::string_view>& allowed,
+                             const std::vector<std::string_view>& besides) {
   std::string found;
   for (const std::string& key : value_->keys) {
     if (std::find(besides.begin(), besides.end(), key) != besides.end()) continue;

@@ -15,7 +15,6 @@ namespace {
 
 constexpr double kMillimetre = 1e-3;  // [m]
 constexpr double kLongest = 1e5;      // [s] of anything
-constexpr double kFastest = 50.0;     // [Hz] of a sine
 
 /// The words of a line, taken one by one.
 class Words {
@@ -66,6 +65,28 @@ double within(Words& words, const std::string& what, int i, const SafetyLimits& 
   return words.number(what, -reach, reach, std::string(c.shown_unit).c_str()) / c.shown;
 }
 
+/// "ramp or sine".
+std::string motionNames(std::string_view between) {
+  std::vector<std::string_view> names;
+  for (const MotionMeaning& one : kMotions)
+    if (one.motion != AxisMotion::kHold) names.push_back(one.name);
+  return fmt::format("{}", fmt::join(names, between));
+}
+
+/// "ramp TO | sine AMPLITUDE FREQUENCY", as the menu shows them.
+std::string motionUsage() {
+  std::vector<std::string> motions;
+  for (const MotionMeaning& one : kMotions) {
+    if (one.motion == AxisMotion::kHold) continue;
+    motions.emplace_back(one.name);
+    for (const MotionNumber& number : one.numbers)
+      if (number.value)
+        for (const char c : " " + std::string(number.word))
+          motions.back() += static_cast<char>(std::toupper(c));
+  }
+  return fmt::format("SECONDS [COORDINATE {}]...", fmt::join(motions, " | "));
+}
+
 Segment trajectory(Words& words, const SafetyLimits& limits) {
   Segment s;
   s.kind = SegmentKind::kTrajectory;
@@ -73,19 +94,22 @@ Segment trajectory(Words& words, const SafetyLimits& limits) {
   while (!words.empty()) {
     const int i = coordinateNamed(words.word("coordinate"));
     const std::string name(coordinate(i).name);
-    Axis& axis = s.trajectory[static_cast<std::size_t>(i)];
-    if (axis.motion != AxisMotion::kHold) throw InputError(name + ": given twice");
-    const std::string motion = words.word((name + ": ramp or sine").c_str());
-    if (motion == "ramp") {
-      axis.motion = AxisMotion::kRamp;
-      axis.final = within(words, name + " ramp", i, limits);
-    } else if (motion == "sine") {
-      axis.motion = AxisMotion::kSine;
-      axis.amplitude = within(words, name + " amplitude", i, limits);
-      axis.frequency = words.number(name + " frequency", 0.0, kFastest, "Hz");
-    } else {
-      throw InputError(fmt::format("{}: '{}', want ramp or sine", name, motion));
+    AxisMotion& motion = s.trajectory.motion[static_cast<std::size_t>(i)];
+    if (motion != AxisMotion::kHold) throw InputError(name + ": given twice");
+    const std::string word = words.word((name + ": " + motionNames(" or ")).c_str());
+    for (const MotionMeaning& one : kMotions) {
+      if (one.name != word || one.motion == AxisMotion::kHold) continue;
+      motion = one.motion;
+      for (const MotionNumber& number : one.numbers)
+        if (number.value) {
+          const std::string what = fmt::format("{} {}", name, number.word);
+          (s.trajectory.*number.value)(i) = number.most > 0.0
+                                                ? words.number(what, 0.0, number.most, "Hz")
+                                                : within(words, what, i, limits);
+        }
     }
+    if (motion == AxisMotion::kHold)
+      throw InputError(fmt::format("{}: '{}', want {}", name, word, motionNames(" or ")));
   }
   return s;
 }
@@ -186,12 +210,12 @@ double parseNumber(const std::string& text, const std::string& what, double lo, 
 }
 
 const std::vector<Item>& menu() {
+  static const std::string motions = motionUsage();
   static const std::vector<Item> items = {
       {Verb::kArm, "arm", "", "take the legs and hold"},
       {Verb::kProgram, "program", "", "what the scenario says, then home"},
       {Verb::kAdmittance, "admittance", "SECONDS", "move as the base would"},
-      {Verb::kTrajectory, "trajectory", "SECONDS [COORDINATE ramp TO | sine AMPLITUDE HZ]...",
-       "a ramp or a sine in each coordinate"},
+      {Verb::kTrajectory, "trajectory", motions.c_str(), "a ramp or a sine in each coordinate"},
       {Verb::kMove, "move", "[in SECONDS] [COORDINATE TO]...", "gently to a pose; alone: home"},
       {Verb::kCalibration, "calibration", "", "the sensor's bias, from 100 samples at rest"},
       {Verb::kTare, "tare", "", "subtract the wrench that is measured now"},

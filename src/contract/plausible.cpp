@@ -16,7 +16,6 @@ constexpr std::int64_t kMostAhead = 1'000'000'000;  // [ns] the longest period
 constexpr double kMaxOrderTime = 1e6;               // [s]
 constexpr double kMaxTranslation = 10.0;            // [m]
 constexpr double kMaxRotation = 10.0;               // [rad]
-constexpr double kMaxFrequency = 1e3;               // [Hz]
 constexpr double kMaxPathTime = 1e4;                // [s] of a tool path
 constexpr double kMaxToolSpeed = 100.0;             // [m/s]
 constexpr double kMaxReach = 100.0;                 // [m] of a tool
@@ -105,12 +104,17 @@ bool plausible(const Order& order) noexcept {
   if (!known(s.kind) || s.kind == SegmentKind::kPath || (takes_time && !(s.duration > 0.0)))
     return false;
   bool good = inRange(s.duration, 0.0, kMaxOrderTime) && inRange(s.interval, 0.0, kMaxOrderTime);
+  for (const AxisMotion motion : s.trajectory.motion) good = good && known(motion);
   for (int i = 0; i < 6; ++i) {
     const double reach = i < 3 ? kMaxTranslation : kMaxRotation;
-    const Axis& axis = s.trajectory[static_cast<std::size_t>(i)];
-    good = good && inRange(axis.motion, AxisMotion::kHold, AxisMotion::kSine) &&
-           inRange(s.target.stacked()(i), -reach, reach) && inRange(axis.final, -reach, reach) &&
-           inRange(axis.amplitude, -reach, reach) && inRange(axis.frequency, 0.0, kMaxFrequency);
+    good = good && inRange(s.target.stacked()(i), -reach, reach);
+    for (const MotionMeaning& motion : kMotions)
+      for (const MotionNumber& number : motion.numbers)
+        if (number.value) {
+          const double x = (s.trajectory.*number.value)(i);
+          good = good &&
+                 (number.most > 0.0 ? inRange(x, 0.0, number.most) : inRange(x, -reach, reach));
+        }
   }
   return good;
 }

@@ -11,25 +11,26 @@ PathPoint<6> trajectoryGeneration(const Trajectory& trajectory, const Vec6& init
   PathPoint<6> out;
   out.x = initial;
   for (int i = 0; i < 6; ++i) {
-    const Axis& axis = trajectory[static_cast<std::size_t>(i)];
-    switch (axis.motion) {
-      case AxisMotion::kHold: break;
+    switch (trajectory.motion[static_cast<std::size_t>(i)]) {
+      case AxisMotion::kHold:
+      case AxisMotion::kCount: break;
       case AxisMotion::kRamp: {
         if (n >= steps) {
-          out.x(i) = axis.final;
+          out.x(i) = trajectory.final(i);
           break;
         }
-        const double delta = (axis.final - initial(i)) / static_cast<double>(steps);  // (C.8)
-        out.x(i) = initial(i) + delta * static_cast<double>(n);                       // (C.9)
+        const double delta =
+            (trajectory.final(i) - initial(i)) / static_cast<double>(steps);  // (C.8)
+        out.x(i) = initial(i) + delta * static_cast<double>(n);               // (C.9)
         out.x_dot(i) = delta / period;
         break;
       }
       case AxisMotion::kSine: {
-        const double w = 2.0 * M_PI * axis.frequency;
+        const double w = 2.0 * M_PI * trajectory.frequency(i);
         const double phase = w * (static_cast<double>(n) * period);
-        out.x(i) = initial(i) + axis.amplitude * std::sin(phase);  // (C.10)
-        out.x_dot(i) = axis.amplitude * w * std::cos(phase);
-        out.x_ddot(i) = -axis.amplitude * w * w * std::sin(phase);
+        out.x(i) = initial(i) + trajectory.amplitude(i) * std::sin(phase);  // (C.10)
+        out.x_dot(i) = trajectory.amplitude(i) * w * std::cos(phase);
+        out.x_ddot(i) = -trajectory.amplitude(i) * w * w * std::sin(phase);
         break;
       }
     }

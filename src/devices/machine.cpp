@@ -6,6 +6,24 @@
 #include "ves/devices/on_bus.hpp"
 
 namespace ves::devices {
+namespace {
+
+/// The driver of a real force sensor; nothing where it is simulated.
+struct ForceSensorOf {
+  const Experiment& experiment;
+  Bus& bus;
+
+  std::unique_ptr<ForceSensor> operator()(Simulated) const { return nullptr; }
+  std::unique_ptr<ForceSensor> operator()(External) const {
+    return std::make_unique<ForceSensorOnBus>(bus);
+  }
+  std::unique_ptr<ForceSensor> operator()(const NetFtAddress& address) const {
+    const plant::PlantConfig& p = experiment.plant;
+    return std::make_unique<NetFt>(address, p.sensor.S_proc(), p.sensor_window);
+  }
+};
+
+}  // namespace
 
 Machine::Machine(const Experiment& experiment, Bus& bus)
     : simulation_(experiment.plant),
@@ -13,13 +31,10 @@ Machine::Machine(const Experiment& experiment, Bus& bus)
       leg_tracker_(experiment.machine.follow),
       joint_tracker_(experiment.machine.follow) {
   const MachinePieces& m = experiment.machine;
-  if (m.legs == Source::kExternal) real_legs_ = std::make_unique<LegsOnBus>(bus);
-  if (m.force_sensor == Source::kExternal) real_sensor_ = std::make_unique<ForceSensorOnBus>(bus);
-  if (m.force_sensor == Source::kNetFt)
-    real_sensor_ = std::make_unique<NetFt>(m.net_ft, experiment.plant.sensor.S_proc(),
-                                           experiment.plant.sensor_window);
-  if (m.robot == Source::kExternal) real_robot_ = std::make_unique<RobotOnBus>(bus);
-  if (m.switches == Source::kExternal) real_switches_ = std::make_unique<SwitchesOnBus>(bus);
+  if (m.external_legs) real_legs_ = std::make_unique<LegsOnBus>(bus);
+  if (m.external_robot) real_robot_ = std::make_unique<RobotOnBus>(bus);
+  if (m.external_switches) real_switches_ = std::make_unique<SwitchesOnBus>(bus);
+  real_sensor_ = std::visit(ForceSensorOf{experiment, bus}, m.force_sensor);
 }
 
 void Machine::command(const LegCommand& command) noexcept {

@@ -84,7 +84,7 @@ std::string limitsOf(Check check, const Experiment& e) {
                        limit.value / limit.unit);
   };
   std::apply([&](const auto&... limit) { (add(limit), ...); },
-             limits(l, e.plant.sensor.volts_per_count));
+             limitTable(l, e.plant.sensor.volts_per_count));
   return out;
 }
 

@@ -38,7 +38,9 @@ Segment sine(double amplitude, double frequency, double duration) {
   Segment s;
   s.kind = SegmentKind::kTrajectory;
   s.duration = duration;
-  s.trajectory[2] = {AxisMotion::kSine, 0.0, amplitude, frequency};
+  s.trajectory.motion[2] = AxisMotion::kSine;
+  s.trajectory.amplitude(2) = amplitude;
+  s.trajectory.frequency(2) = frequency;
   return s;
 }
 

@@ -38,9 +38,9 @@ Segment drawSegment(Dice& dice) {
   Vec6 target;
   for (int i = 0; i < 6; ++i) {
     target(i) = (i < 3 ? 0.3 : 0.5) * (dice.pick(2001) - 1000) * 1e-3;
-    segment.trajectory[static_cast<std::size_t>(i)] = {static_cast<AxisMotion>(dice.pick(3)),
-                                                       0.3 * target(i), 0.3 * target(i),
-                                                       0.01 * dice.pick(100)};
+    segment.trajectory.motion[static_cast<std::size_t>(i)] = static_cast<AxisMotion>(dice.pick(3));
+    segment.trajectory.final(i) = segment.trajectory.amplitude(i) = 0.3 * target(i);
+    segment.trajectory.frequency(i) = 0.01 * dice.pick(100);
   }
   segment.target = Pose::from(0.5 * target);
   if (segment.kind == SegmentKind::kMove) segment.duration = 0.0;

@@ -155,7 +155,7 @@ void LiveRun::remind() {
   if (stop_ && !stop_->taken && stop_->times > 0 && now - stop_->sent > kStopRepeat) {
     stop_->sent = now;
     --stop_->times;
-    bus_.publish(channel::kOperator, toMessage(Order{Request::kStop, {}, {}}, controller_.source,
+    bus_.publish(channel::kOperator, toMessage(Order{Request::kStop, {}, {}, controller_.source},
                                                header(self_, stop_->sequence, now)));
   }
 }

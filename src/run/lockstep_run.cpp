@@ -57,10 +57,9 @@ RunResult runRecorded(const Experiment& experiment, RunRecorder* recorder, const
     if (monitor.reached(state, order.request)) break;
     if (order.request == Request::kRun) {
       order.id = {controller.source, orders++};
+      order.controller = controller.source;
       if (recorder)
-        recorder->order(
-            toMessage(order, controller.source, header(controller, order.id.sequence, time())),
-            time());
+        recorder->order(toMessage(order, header(controller, order.id.sequence, time())), time());
     }
   }
   return monitor.result(monotonicNow() - start);

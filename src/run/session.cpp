@@ -96,9 +96,10 @@ std::optional<Refusal> Session::order(const Order& order) {
   while (!state_ && running() && monotonicNow() < until) listen(kRepeat);
   if (!state_) return {};
   const std::int64_t sequence = orders_++;
+  Order addressed = order;
+  addressed.controller = state_->header.source;
   for (int i = 0; i < kRepeats && running(); ++i) {
-    bus_.publish(channel::kOperator,
-                 toMessage(order, state_->header.source, header(self_, sequence, monotonicNow())));
+    bus_.publish(channel::kOperator, toMessage(addressed, header(self_, sequence, monotonicNow())));
     const std::int64_t repeat = monotonicNow() + kRepeat * 1'000'000LL;
     while (monotonicNow() < repeat && running()) {
       listen(10);

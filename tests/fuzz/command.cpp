@@ -16,8 +16,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     // What the menu lets through, the gate does too.
     if (command.order.request != ves::Request::kNone)
       ves::fuzz::require(
-          ves::fromMessage(ves::toMessage(command.order, 1, ves::header({1, 1}, 0, 0)))
-              .has_value());
+          ves::fromMessage(ves::toMessage(command.order, ves::header({1, 1}, 0, 0))).has_value());
   } catch (const ves::InputError&) {
   }
   try {

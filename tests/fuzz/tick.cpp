@@ -23,9 +23,11 @@ Segment segment(fuzz::Bytes& in) {
   Vec6 target;
   for (int i = 0; i < 6; ++i) {
     target(i) = 1e-5 * in.take<std::int16_t>();
-    s.trajectory[static_cast<std::size_t>(i)] = {
-        static_cast<AxisMotion>(in.take<std::uint8_t>() % 3), 1e-5 * in.take<std::int16_t>(),
-        1e-5 * in.take<std::int16_t>(), 0.02 * in.take<std::uint8_t>()};
+    s.trajectory.motion[static_cast<std::size_t>(i)] =
+        static_cast<AxisMotion>(in.take<std::uint8_t>() % static_cast<int>(AxisMotion::kCount));
+    s.trajectory.final(i) = 1e-5 * in.take<std::int16_t>();
+    s.trajectory.amplitude(i) = 1e-5 * in.take<std::int16_t>();
+    s.trajectory.frequency(i) = 0.02 * in.take<std::uint8_t>();
   }
   s.target = Pose::from(target);
   return s;

@@ -57,8 +57,16 @@ inline Segment segment(SegmentKind kind, double duration = 0.0) {
 
 inline Segment sine(int coordinate, double amplitude, double frequency, double duration) {
   Segment s = segment(SegmentKind::kTrajectory, duration);
-  s.trajectory[static_cast<std::size_t>(coordinate)] = {AxisMotion::kSine, 0.0, amplitude,
-                                                        frequency};
+  s.trajectory.motion[static_cast<std::size_t>(coordinate)] = AxisMotion::kSine;
+  s.trajectory.amplitude(coordinate) = amplitude;
+  s.trajectory.frequency(coordinate) = frequency;
+  return s;
+}
+
+inline Segment ramp(int coordinate, double to, double duration) {
+  Segment s = segment(SegmentKind::kTrajectory, duration);
+  s.trajectory.motion[static_cast<std::size_t>(coordinate)] = AxisMotion::kRamp;
+  s.trajectory.final(coordinate) = to;
   return s;
 }
 

@@ -361,7 +361,9 @@ class World {
     }
     if (tick_ >= stalled_until_) laws_.ordered({kOperator, orders_});
     ++orders_;
-    send(channel::kOperator, toMessage(command.order, controller_->id.source, h));
+    Order order = command.order;
+    order.controller = controller_->id.source;
+    send(channel::kOperator, toMessage(order, h));
   }
 
   void beginIntruder(const Event& event) {

@@ -47,9 +47,11 @@ Segment segment(SegmentKind kind, double duration = 0.0, const Pose& target = {}
   return s;
 }
 
-Segment sine(std::size_t coordinate, double amplitude, double frequency, double duration) {
+Segment sine(int coordinate, double amplitude, double frequency, double duration) {
   Segment s = segment(SegmentKind::kTrajectory, duration);
-  s.trajectory[coordinate] = {AxisMotion::kSine, 0.0, amplitude, frequency};
+  s.trajectory.motion[static_cast<std::size_t>(coordinate)] = AxisMotion::kSine;
+  s.trajectory.amplitude(coordinate) = amplitude;
+  s.trajectory.frequency(coordinate) = frequency;
   return s;
 }
 
@@ -123,8 +125,9 @@ class Recorder {
         Vec6 target;
         for (int k = 0; k < 6; ++k) {
           target(k) = (k < 3 ? 0.3 : 0.5) * (pick(2001) - 1000) * 1e-3;
-          segment.trajectory[static_cast<std::size_t>(k)] = {
-              static_cast<AxisMotion>(pick(3)), 0.3 * target(k), 0.3 * target(k), 0.01 * pick(100)};
+          segment.trajectory.motion[static_cast<std::size_t>(k)] = static_cast<AxisMotion>(pick(3));
+          segment.trajectory.final(k) = segment.trajectory.amplitude(k) = 0.3 * target(k);
+          segment.trajectory.frequency(k) = 0.01 * pick(100);
         }
         segment.target = Pose::from(0.5 * target);
         if (segment.kind == SegmentKind::kMove && chance(0.5)) segment.duration = 0.0;

@@ -24,6 +24,8 @@ struct MirrorOf<leg_command_t> : std::type_identity<LegCommand> {};
 template <>
 struct MirrorOf<setup_t> : std::type_identity<MachineSetup> {};
 template <>
+struct MirrorOf<operator_t> : std::type_identity<Order> {};
+template <>
 struct MirrorOf<state_t> : std::type_identity<TickState> {};
 
 /// Calls f(field, value) for every field of a struct and its value in the message.

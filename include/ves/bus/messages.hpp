@@ -42,8 +42,7 @@ sample_t toMessage(const Sample& sample, const Identity& from) noexcept;
 leg_command_t toMessage(const LegCommand& command, const header_t& header) noexcept;
 setup_t toMessage(const MachineSetup& setup, const header_t& header) noexcept;
 state_t toMessage(const TickState& state, const header_t& header) noexcept;
-/// `controller` is the header.source of the states of the one that is meant.
-operator_t toMessage(const Order& order, std::int64_t controller, const header_t& header) noexcept;
+operator_t toMessage(const Order& order, const header_t& header) noexcept;
 robot_command_t toMessage(const RobotOrder& order, const header_t& header) noexcept;
 
 /// "panic button, floor mat"; empty when none tripped.

@@ -83,7 +83,7 @@ class Section {
   std::string text(std::string_view key);
   /// A list of texts, which may be empty.
   std::vector<std::string> texts(std::string_view key);
-  std::string choice(std::string_view key, std::initializer_list<std::string_view> allowed);
+  std::string choice(std::string_view key, const std::vector<std::string_view>& allowed);
   /// `size` numbers; any number of them (at least one) when size is -1.
   Eigen::VectorXd vector(std::string_view key, int size, double lo, double hi);
   /// rows x cols numbers, row by row; any number of rows (at least one) when rows is -1, as many
@@ -94,8 +94,8 @@ class Section {
   std::vector<Section> list(std::string_view key);
 
   /// The only key of this map, which names its kind.
-  std::string onlyKey(std::initializer_list<std::string_view> allowed,
-                      std::initializer_list<std::string_view> besides);
+  std::string onlyKey(const std::vector<std::string_view>& allowed,
+                      const std::vector<std::string_view>& besides);
 
   /// Refuses keys that nobody asked for.
   void finish() const;

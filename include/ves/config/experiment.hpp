@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "ves/config/calibration.hpp"
@@ -21,33 +22,33 @@
 namespace ves {
 
 /// Where a piece of the machine is.
-enum class Source {
-  kSimulated,
-  kExternal,  // a driver on the bus
-  kNetFt      // a force sensor that speaks ATI's RDT
-};
+struct Simulated {};
+struct External {};  // a driver on the bus
 
+/// A force sensor that speaks ATI's RDT.
 struct NetFtAddress {
   std::string host;
   int port = 0;       // [-] UDP, of its records
   int http_port = 0;  // [-] of its configuration
 };
 
+/// A driver of force sensors has its own kind; config/machine.cpp reads it, devices/machine.cpp
+/// makes it.
+using ForceSensorSource = std::variant<Simulated, External, NetFtAddress>;
+
 /// Which pieces of the machine are real, and how they are reached. The simulated ones are the
 /// plant's.
 struct MachinePieces {
-  Source legs = Source::kSimulated;
-  Source force_sensor = Source::kSimulated;
-  Source robot = Source::kSimulated;
-  Source switches = Source::kSimulated;
-  NetFtAddress net_ft;
+  bool external_legs = false;  // else simulated
+  bool external_robot = false;
+  bool external_switches = false;
+  ForceSensorSource force_sensor;
   std::int64_t period = 0;  // [ns] between samples, in real time
   double follow = 0.0;      // [1/s] bandwidth at which simulated pieces follow real legs and joints
 
   bool simulated() const {
-    for (const Source s : {legs, force_sensor, robot, switches})
-      if (s != Source::kSimulated) return false;
-    return true;
+    return !external_legs && !external_robot && !external_switches &&
+           std::holds_alternative<Simulated>(force_sensor);
   }
 };
 

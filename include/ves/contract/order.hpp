@@ -11,17 +11,53 @@
 
 namespace ves {
 
-enum class AxisMotion : std::int32_t { kHold, kRamp, kSine };
+/// What one coordinate of a trajectory does.
+enum class AxisMotion : std::int32_t { kHold, kRamp, kSine, kCount };
 
-/// What one coordinate does.
-struct Axis {
-  AxisMotion motion = AxisMotion::kHold;
-  double final = 0.0;      // [m | rad] of a ramp, counted from home
-  double amplitude = 0.0;  // [m | rad] of a sine
-  double frequency = 0.0;  // [Hz] of a sine
+/// What the six coordinates do, and the numbers of it; those of other motions count for nothing.
+struct Trajectory {
+  std::array<AxisMotion, 6> motion{};
+  Vec6 final = Vec6::Zero();      // [m | rad] of a ramp, counted from home
+  Vec6 amplitude = Vec6::Zero();  // [m | rad] of a sine
+  Vec6 frequency = Vec6::Zero();  // [Hz] of a sine
 };
 
-using Trajectory = std::array<Axis, 6>;
+/// A number that a motion takes.
+struct MotionNumber {
+  const char* key = nullptr;   // in a scenario; of a length or an angle "_m" or "_deg" follows
+  const char* word = nullptr;  // at the console
+  Vec6 Trajectory::*value = nullptr;
+  double most = 0.0;  // [Hz]; 0: it is a length or an angle
+};
+
+/// How a motion is asked for, in scenarios and orders.
+struct MotionMeaning {
+  AxisMotion motion;
+  std::string_view name;
+  std::array<MotionNumber, 3> numbers{};
+};
+
+/// One line a motion, in the order of AxisMotion.
+inline constexpr MotionMeaning kMotions[] = {
+    {AxisMotion::kHold, "hold", {}},
+    {AxisMotion::kRamp, "ramp", {{{"to", "to", &Trajectory::final}}}},
+    {AxisMotion::kSine,
+     "sine",
+     {{{"amplitude", "amplitude", &Trajectory::amplitude},
+       {"frequency_hz", "frequency", &Trajectory::frequency, 50.0}}}},
+};
+static_assert(
+    [] {
+      int n = 0;
+      for (const MotionMeaning& m : kMotions)
+        if (static_cast<int>(m.motion) != n++) return false;
+      return n == static_cast<int>(AxisMotion::kCount);
+    }(),
+    "each motion has a line in kMotions, in the order of AxisMotion");
+
+constexpr std::string_view name(AxisMotion motion) noexcept {
+  return motion < AxisMotion::kCount ? kMotions[static_cast<std::size_t>(motion)].name : "unknown";
+}
 
 enum class SegmentKind : std::int32_t {
   kCalibration,  // hold until still, and take the bias of the sensor
@@ -38,10 +74,10 @@ std::string_view name(SegmentKind kind) noexcept;
 /// One item of testPlatform's menu.
 struct Segment {
   SegmentKind kind = SegmentKind::kTrajectory;
-  double duration = 0.0;    // [s] of a move: 0 for as long as is gentle
-  Pose target;              // of a move, from home
-  Trajectory trajectory{};  // of a trajectory
-  double interval = 0.0;    // [s] of a monitor segment, from one sample to the next
+  double duration = 0.0;  // [s] of a move: 0 for as long as is gentle
+  Pose target;            // of a move, from home
+  Trajectory trajectory;  // of a trajectory
+  double interval = 0.0;  // [s] of a monitor segment, from one sample to the next
 };
 
 inline constexpr int kMaxSegments = 64;
@@ -100,6 +136,7 @@ struct Order {
   Request request = Request::kNone;
   Segment segment;  // of kRun
   OrderId id;
+  std::int64_t controller = 0;  // header.source of the states of the one that is meant
 };
 
 }  // namespace ves

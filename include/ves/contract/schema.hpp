@@ -13,6 +13,7 @@
 #include <tuple>
 
 #include "ves/contract/members.hpp"
+#include "ves/contract/order.hpp"
 #include "ves/contract/setup.hpp"
 #include "ves/contract/tick_state.hpp"
 
@@ -97,6 +98,32 @@ constexpr auto fields(S& s) {
             "the checked lengths: where the legs rest should no command follow", kLegs},
       Field{"ahead_ns", "ns", s.ahead,
             "after its tick, for which these are meant: 0, or a period in admittance control"},
+  };
+}
+
+template <>
+inline constexpr Message kMessage<Order>{
+    "operator_t",
+    "Operator -> controller. Channel VES_OPERATOR. Of what follows `request` only a run's counts."};
+
+/// header: source and sequence are `id`.
+template <Of<Order> S>
+constexpr auto fields(S& s) {
+  using enum Along;
+  auto& segment = s.segment;
+  auto& trajectory = segment.trajectory;
+  return std::tuple{
+      Field{"controller", "-", s.controller,
+            "header.source of its state_t: an order to another one, or an old log's, is not taken"},
+      Field{"request", "-", s.request, ""},
+      Field{"kind", "-", segment.kind, "what to run"},
+      Field{"duration", "s", segment.duration, "of a move: 0 for as long as is gentle"},
+      Field{"interval", "s", segment.interval, "of a monitor segment"},
+      Field{"target", "m, rad", segment.target, "of a move, from home", kCoordinates},
+      Field{"motion", "-", trajectory.motion, "of a trajectory's coordinates", kCoordinates},
+      Field{"final", "m, rad", trajectory.final, "of a ramp, from home", kCoordinates},
+      Field{"amplitude", "m, rad", trajectory.amplitude, "of a sine", kCoordinates},
+      Field{"frequency", "Hz", trajectory.frequency, "of a sine", kCoordinates},
   };
 }
 
@@ -237,7 +264,8 @@ constexpr auto fields(S& s) {
 }
 
 static_assert(members<Sample>() == 15 && members<LegCommand>() == 7 &&
-                  members<MachineSetup>() == 17 && members<TickState>() == 48,
+                  members<MachineSetup>() == 17 && members<TickState>() == 48 &&
+                  members<Order>() == 4 && members<Segment>() == 5 && members<Trajectory>() == 4,
               "a member has come or gone: describe it above, and count it here");
 
 /// f(field) of each.
@@ -262,6 +290,11 @@ void put(E from, std::int32_t& to) noexcept { to = static_cast<std::int32_t>(fro
 template <std::size_t N>
 void put(const std::array<std::int32_t, N>& from, std::int32_t (&to)[N]) noexcept {
   std::copy(from.begin(), from.end(), to);
+}
+template <typename E, std::size_t N>
+requires std::is_enum_v<E>
+void put(const std::array<E, N>& from, std::int32_t (&to)[N]) noexcept {
+  std::transform(from.begin(), from.end(), to, [](E e) { return static_cast<std::int32_t>(e); });
 }
 template <int R, int C>
 using RowByRow = Eigen::Matrix<double, R, C, C == 1 ? Eigen::ColMajor : Eigen::RowMajor>;
@@ -297,6 +330,13 @@ template <std::size_t N>
 bool take(const std::int32_t (&from)[N], std::array<std::int32_t, N>& to) noexcept {
   std::copy(std::begin(from), std::end(from), to.begin());
   return true;
+}
+template <typename E, std::size_t N>
+requires std::is_enum_v<E>
+bool take(const std::int32_t (&from)[N], std::array<E, N>& to) noexcept {
+  bool good = true;
+  for (std::size_t i = 0; i < N; ++i) good = take(from[i], to[i]) && good;
+  return good;
 }
 template <int R, int C>
 bool take(const double (&from)[R * C], Eigen::Matrix<double, R, C>& to) noexcept {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // The numbers that the safety checks compare with, and their keys in the section `safety` of a
-// configuration. A new one: a member, a line in limits(), a value in config/ves.yaml.
+// configuration. A new one: a member, a line in limitTable(), a value in config/ves.yaml.
 #pragma once
 
 #include <cmath>
@@ -67,7 +67,7 @@ Limit(const char*, T&, Rest...) -> Limit<T>;
 
 /// All but `alone`, which is the legs' own. `volts_per_count`: of the converter.
 template <typename L>
-constexpr auto limits(L& l, double volts_per_count) {
+constexpr auto limitTable(L& l, double volts_per_count) {
   constexpr double kTiny = 1e-12, kSquareCentimetre = 1e-4, kLitre = 1e-3;
   const double volt = 1.0 / volts_per_count;
   return std::tuple{
@@ -107,8 +107,9 @@ constexpr auto limits(L& l, double volts_per_count) {
   };
 }
 
-static_assert(std::tuple_size_v<decltype(limits(*static_cast<SafetyLimits*>(nullptr), 1.0))> + 1 ==
+static_assert(std::tuple_size_v<decltype(limitTable(*static_cast<SafetyLimits*>(nullptr), 1.0))> +
+                      1 ==
                   members<SafetyLimits>(),
-              "each limit but `alone` has a line in limits()");
+              "each limit but `alone` has a line in limitTable()");
 
 }  // namespace ves
