@@ -217,7 +217,10 @@ struct BaseKind {
   std::string_view key;
   Base (*read)(Section& s);
 };
-constexpr BaseKind kBases[] = {{"arm", readArmBase}, {"modes", readModes}, {"mass", readMatrices}};
+constexpr BaseKind kBases[] = {{"arm", readArmBase},
+                               {"modes", readModes},
+                               {"mass", readMatrices},
+                               {"mass_diagonal", readMatrices}};
 
 }  // namespace
 
