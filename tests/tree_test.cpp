@@ -231,7 +231,7 @@ TEST(UrdfTree, RefusesJointsThatFollowNobodyOrThemselves) {
             "r.urdf:7: joint 'other': follows 'flange', which is no joint that moves");
   EXPECT_EQ(said(kGripper, "mimic joint=\"open\"", "mimic joint=\"other\""),
             "r.urdf:7: joint 'other': follows itself");
-  EXPECT_NE(said(kGripper, "multiplier=\"-1\"", "multiplier=\"1e9\"").find("want numbers within"),
+  EXPECT_NE(said(kGripper, "multiplier=\"-1\"", "multiplier=\"1e9\"").find("want a number within"),
             std::string::npos);
 }
 

@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "spelling.hpp"
 #include "ves/config/document.hpp"
 
 namespace ves {
@@ -27,22 +28,6 @@ std::string interval(double lo, double hi) {
   return fmt::format("a number in [{}, {}]", lo, hi);
 }
 
-/// Edit distance, for "did you mean".
-std::size_t distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t above = row[j];
-      row[j] = std::min({above + 1, row[j - 1] + 1, diagonal + (a[i - 1] != b[j - 1])});
-      diagonal = above;
-    }
-  }
-  return row.back();
-}
-
 }  // namespace
 
 Section::Section(const Value& value, std::string path) : value_(&value), path_(std::move(path)) {
@@ -61,7 +46,7 @@ const Value& Section::need(std::string_view key) {
   if (value) return *value;
   // A slip of the pen is told as such.
   for (const std::string& given : value_->keys)
-    if (!used_.count(given) && distance(given, key) <= 1 + given.size() / 3)
+    if (!used_.count(given) && editDistance(given, key) <= 1 + given.size() / 3)
       fail(given, fmt::format("unknown key, did you mean {}?", key));
   fail(key, "missing");
 }
@@ -206,8 +191,8 @@ void Section::finish() const {
     std::string hint;
     std::size_t best = 1 + key.size() / 3;
     for (const std::string& known : used_) {
-      if (value_->find(known) || distance(key, known) > best) continue;
-      best = distance(key, known);
+      if (value_->find(known) || editDistance(key, known) > best) continue;
+      best = editDistance(key, known);
       hint = fmt::format(", did you mean {}?", known);
     }
     if (hint.empty()) hint = fmt::format(", known here: {}", fmt::join(used_, ", "));

@@ -231,6 +231,11 @@ std::set<int> Scene::addVisuals(const UrdfRobot& description) {
         shape["kind"] = "sphere";
         shape["radius"] = visual.size(0);
         break;
+      case Visual::Kind::kCapsule: {
+        const Vec3 half = 0.5 * visual.size(1) * Vec3::UnitZ();
+        shape = capsule(shape["frame"], X * Vec3(-half), X * half, visual.size(0));
+        break;
+      }
       case Visual::Kind::kMesh: {
         const std::filesystem::path file = findMesh(visual.mesh);
         if (file.empty()) {

@@ -8,7 +8,11 @@ namespace ves {
 RigidBody combine(const RigidBody& a_A, const Transform& X_AB, const RigidBody& b_B) noexcept {
   RigidBody sum;
   sum.mass = a_A.mass + b_B.mass;
-  if (!(sum.mass > 0.0)) return a_A;
+  if (!(sum.mass > 0.0)) {  // inertia alone
+    sum.p_BoBcm_B = a_A.p_BoBcm_B;
+    sum.I_Bcm_B = a_A.I_Bcm_B + X_AB.R * b_B.I_Bcm_B * X_AB.R.transpose();
+    return sum;
+  }
   const Vec3 a = a_A.p_BoBcm_B, b = X_AB * b_B.p_BoBcm_B;
   sum.p_BoBcm_B = (a_A.mass * a + b_B.mass * b) / sum.mass;
   const Mat3 Sa = skew(a - sum.p_BoBcm_B), Sb = skew(b - sum.p_BoBcm_B);

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // Robots: any text is a serial arm with finite numbers, or one line.
-#include <console_bridge/console.h>
-
 #include <cmath>
 #include <string>
 
@@ -11,7 +9,6 @@
 #include "ves/core/errors.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  console_bridge::noOutputHandler();
   try {
     const ves::UrdfRobot robot =
         ves::loadUrdf(std::string(reinterpret_cast<const char*>(data), size), "fuzz.urdf");

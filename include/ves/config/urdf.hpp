@@ -29,7 +29,7 @@ struct NamedFrame {
 
 /// What a link looks like.
 struct Visual {
-  enum class Kind { kBox, kCylinder, kSphere, kMesh };
+  enum class Kind { kBox, kCylinder, kSphere, kCapsule, kMesh };
   Kind kind = Kind::kBox;
   int frame = 0;             // [-] of the link, of `frames`
   Transform X_frame;         // its pose there
