@@ -10,8 +10,8 @@
 #include "ves/analysis/appendix_e.hpp"
 #include "ves/analysis/gate.hpp"
 #include "ves/analysis/loop.hpp"
-#include "ves/math/dense.hpp"
 #include "ves/evaluation/comparison.hpp"
+#include "ves/math/dense.hpp"
 #include "ves/run/run.hpp"
 #include "ves/srms/modes.hpp"
 

@@ -12,11 +12,11 @@
 #include <iterator>
 
 #include "support/rig.hpp"
-#include "ves/run/announcer.hpp"
-#include "ves/series/series.hpp"
 #include "ves/evaluation/summary.hpp"
 #include "ves/evaluation/tool_motion.hpp"
+#include "ves/run/announcer.hpp"
 #include "ves/run/run.hpp"
+#include "ves/series/series.hpp"
 
 namespace ves {
 namespace {
@@ -173,10 +173,44 @@ class SecondOrderFilter {
   Vec3 u_ = Vec3::Zero(), y_ = Vec3::Zero(), v_ = Vec3::Zero();
 };
 
-TEST_F(ClosedLoop, GravityCompensationLeavesQuantisationAndFilterLag) {
-  const Experiment e = experiment("puma_tilt");
-  const double weight = 9.81 * (52.45 + 16.0 + 5.0);
-  const Vec3 weight_I(0.0, 0.0, -weight);
+/// A sensor that is mounted somehow, and a laboratory that is tilted.
+struct Mounted {
+  const char* name;
+  Vec3 gravity;  // [m/s^2]
+  std::vector<std::string> set;
+};
+std::ostream& operator<<(std::ostream& out, const Mounted& m) { return out << m.name; }
+const Mounted kMounted[] = {{"as_published", {0.0, 0.0, -9.81}, {}},
+                            {"turned_sensor", {0.0, 0.0, -9.81}, {"sensor.rpy_deg=[35, -50, 120]"}},
+                            {"tilted",
+                             {2.0, -3.0, -9.0},
+                             {"sensor.rpy_deg=[200, 40, -75]", "gravity_m_per_s2=[2, -3, -9]"}}};
+
+class Mounting : public ClosedLoop, public testing::WithParamInterface<Mounted> {};
+INSTANTIATE_TEST_SUITE_P(, Mounting, testing::ValuesIn(kMounted),
+                         [](const auto& test) { return std::string(test.param.name); });
+
+TEST_P(Mounting, TheEmulationIsTheSame) {
+  std::vector<std::string> set = GetParam().set;
+  set.push_back("sensor.noise=false");
+  const Series published = run(experiment("puma_on_table_4_1", {"sensor.noise=false"})),
+               mounted = run(experiment("puma_on_table_4_1", set));
+  ASSERT_EQ(mounted.rows.size(), published.rows.size());
+  Vec6 most = Vec6::Zero(), moved = Vec6::Zero();
+  for (std::size_t i = 0; i < mounted.rows.size(); ++i) {
+    const Vec6 x = Vec6::Map(published.rows[i].state.x);
+    most = most.cwiseMax((Vec6::Map(mounted.rows[i].state.x) - x).cwiseAbs());
+    moved = moved.cwiseMax(x.cwiseAbs());
+  }
+  // Other counts make it up, of 0.1 to 0.3 N each: on 1500 N/m less than half a millimetre.
+  EXPECT_GT(moved.maxCoeff(), 0.05);
+  EXPECT_LT(most.maxCoeff(), 0.5e-3);
+}
+
+TEST_P(Mounting, GravityCompensationLeavesQuantisationAndFilterLag) {
+  const Experiment e = experiment("puma_tilt", GetParam().set);
+  const Vec3 weight_I = GetParam().gravity * (52.45 + 16.0 + 5.0);
+  const double weight = weight_I.norm();
   // Quantisation: half an A/D count on each channel twice (reading and calibration), and half a
   // Temposonics count on each leg, which tilts the model gravity. Worst cases, added up.
   const double quantisation =
@@ -213,7 +247,7 @@ TEST_F(ClosedLoop, GravityCompensationLeavesQuantisationAndFilterLag) {
           } else {
             moving = std::max(moving, left);
             allowed = std::max(allowed, lagging);
-            ASSERT_LT(left, 1.25 * allowed + quantisation) << "tick " << in.tick;
+            ASSERT_LT(left, 1.25 * (allowed + quantisation)) << "tick " << in.tick;
           }
         }
       }

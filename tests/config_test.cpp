@@ -308,7 +308,20 @@ INSTANTIATE_TEST_SUITE_P(
             "platform.base_joints_m: has 4 coordinates a joint, want x, y or x, y, z"},
         Bad{"derived_elsewhere", "z_sine", "legs.tau_s=derived", "legs.tau_s: 'derived', want"},
         Bad{"derived_out_of_range", "arm_on_desk", "platform.home_height_m=0.02",
-            "safety.plate_angle_deg: the derived value is -"},
+            "safety.rotation_deg: inside of the workspace, at alpha -12 deg, the platform is near "
+            "singular"},
+        Bad{"joints_numbered_one_off", "arm_on_desk",
+            "platform.platform_joints_m=[[0.040148,0.044589],[0.018541,0.057063],[-0.058689,0."
+            "012475],[-0.058689,-0.012475],[0.018541,-0.057063],[0.040148,-0.044589]]",
+            "the platform is near singular"},
+        Bad{"legs_that_cross", "arm_on_desk", "platform.home_height_m=9.5",
+            "platform.platform_joints_m: at home legs 1 and 6 cross: their axes are 25 mm apart"},
+        Bad{"platform_in_inches", "arm_on_desk",  // the desk's own, times 39.37
+            "platform={base_joints_m: "
+            "[[3.85,-0.82],[3.85,0.82],[-1.22,3.74],[-2.63,2.93],[-2.63,-2."
+            "93],[-1.22,-3.74]], platform_joints_m: [[1.58,-1.76],[1.58,1.76],[0.73,2.25],[-2.31,0."
+            "49],[-2.31,-0.49],[0.73,-2.25]], home_height_m: 5.51}",
+            "are the platform's lengths in inches or mm, and not in m?"},
         Bad{"initial_pose_out_of_reach", "z_sine", "initial_pose.z_m=0.9",
             "initial_pose: takes leg 1 to 2.3"},
         Bad{"joint_outside_limits", "puma_tilt", "robot.joints_deg_or_m=[0, 90, 0, 0, 0, 0]",

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // A machine that keeps all requirements of docs/machine.md, and one for each that breaks it.
-#include "ves/run/announcer.hpp"
 #include "ves/doctor/conform.hpp"
+#include "ves/run/announcer.hpp"
 
 #include <gtest/gtest.h>
 

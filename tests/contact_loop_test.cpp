@@ -5,8 +5,8 @@
 
 #include "support/refusal.hpp"
 #include "support/rig.hpp"
-#include "ves/analysis/leaning.hpp"
 #include "ves/analysis/gate.hpp"
+#include "ves/analysis/leaning.hpp"
 #include "ves/math/dense.hpp"
 #include "ves/srms/interaction.hpp"
 

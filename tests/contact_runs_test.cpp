@@ -7,9 +7,9 @@
 #include "support/rig.hpp"
 #include "ves/bus/messages.hpp"
 #include "ves/config/experiment.hpp"
-#include "ves/plant/plant.hpp"
 #include "ves/evaluation/contact_pairs.hpp"
 #include "ves/evaluation/summary.hpp"
+#include "ves/plant/plant.hpp"
 #include "ves/run/truth.hpp"
 #include "ves/srms/interaction.hpp"
 

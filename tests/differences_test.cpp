@@ -5,6 +5,7 @@
 
 #include "support/rig.hpp"
 #include "ves/evaluation/differences.hpp"
+#include "ves/evaluation/evidence.hpp"
 
 namespace ves {
 namespace {
@@ -24,6 +25,18 @@ std::string text(const std::vector<KeyDifference>& differences) {
     out += "\n";
   }
   return out;
+}
+
+// A freeze holds the pose before the one that failed: that one is what is told.
+TEST(Evidence, IsOfThePoseThatFailed) {
+  const Experiment e = ramp();
+  Row row{};
+  row.state.x[0] = 0.3049;
+  row.state.x_dot[0] = 0.05;  // [m/s] 0.5 mm in a tick
+  EXPECT_EQ(evidence(Check::kMotionLimits, row, e),
+            "x at 305.4 mm, want at most 305.0 (safety.translation_m)");
+  row.state.x_dot[0] = 0.0;
+  EXPECT_EQ(evidence(Check::kVelocity, row, e), "safety.leg_velocity_m_per_s 0.75");
 }
 
 TEST(Differences, NameTheLeavesThatWereChanged) {

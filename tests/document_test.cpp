@@ -162,6 +162,43 @@ TEST_F(Files, ARobotMayBeARigidPayload) {
   EXPECT_EQ(refusal([&] { loadExperiment(scenario(", joints_deg_or_m: []")); }), "");
 }
 
+TEST(Yaml, MergeKeysAreMergedInPlace) {
+  Value v = parseDocument(
+      "a: &a {x: 1, y: 2}\nb: &b {z: 3}\none: {<<: *a, y: 5}\nmany: {y: 7, <<: [*b, *a]}\n",
+      "f.yaml");
+  const auto at = [&](const char* map, const char* key) { return v.find(map)->find(key)->text; };
+  EXPECT_EQ(at("one", "x") + at("one", "y"), "15");
+  EXPECT_EQ(at("many", "x") + at("many", "y") + at("many", "z"), "173");
+  EXPECT_FALSE(v.find("one")->find("<<"));
+  EXPECT_NE(refusal([] { parseDocument("a: {<<: 3}", "f.yaml"); }).find("f.yaml:1: <<: want a map"),
+            std::string::npos);
+}
+
+TEST(Yaml, ATabThatIndentsIsNamed) {
+  EXPECT_NE(refusal([] {
+              parseDocument("a: 1\nlegs:\n\tK_P: 8000\n", "f.yaml");
+            }).find("a tab indents line 3, want blanks"),
+            std::string::npos);
+}
+
+TEST_F(Files, ArePathsWhateverTheirNames) {
+  fs::create_directories(folder_ / "cell: #1");
+  // Content decides, not the ending.
+  for (const char* name : {"a: b.urdf", "[r].URDF", "r.xml", "cell: #1/r"})
+    EXPECT_EQ(loadRobot(put(name, kBrick), {}).robot.model.base.mass, 20.0) << name;
+  EXPECT_EQ(loadRobot(put("robot", "urdf: r.xml\n"), {}).robot.model.base.mass, 20.0);
+  const fs::path scenario = put("s.yml", "name: s\n");
+  EXPECT_EQ(findFile("scenario", scenario.string(), folder_), scenario);
+}
+
+TEST(Yaml, ANameThatNoFolderCanHaveIsRefused) {
+  EXPECT_NE(refusal([] {
+              loadExperiment(test::configDir() + "/scenarios/z_sine.yaml",
+                             {"name=" + std::string(101, 'x')});
+            }).find("name: has 101 letters, want at most 100"),
+            std::string::npos);
+}
+
 TEST(UrdfLimits, WhatIsMonstrousIsRefusedInOneLine) {
   const auto said = [](const std::string& text) {
     return refusal([&] { loadUrdf(text, "r.urdf"); });

@@ -15,8 +15,8 @@
 #include "support/rig.hpp"
 #include "ves/bus/channels.hpp"
 #include "ves/bus/event_log.hpp"
-#include "ves/series/series.hpp"
 #include "ves/run/run.hpp"
+#include "ves/series/series.hpp"
 
 namespace ves {
 namespace {

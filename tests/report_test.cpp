@@ -7,8 +7,8 @@
 
 #include "support/rig.hpp"
 #include "ves/analysis/loop.hpp"
-#include "ves/math/dense.hpp"
 #include "ves/evaluation/comparison.hpp"
+#include "ves/math/dense.hpp"
 #include "ves/run/run.hpp"
 #include "ves/validation/chapter4.hpp"
 #include "ves/validation/page.hpp"

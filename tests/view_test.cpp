@@ -16,13 +16,13 @@
 #include "support/rig.hpp"
 #include "support/robots.hpp"
 #include "ves/bus/channels.hpp"
-#include "ves/pictures/marks.hpp"
 #include "ves/evaluation/tool_motion.hpp"
 #include "ves/page/live_run.hpp"
 #include "ves/page/page.hpp"
 #include "ves/page/scene.hpp"
 #include "ves/page/still.hpp"
 #include "ves/page/web_server.hpp"
+#include "ves/pictures/marks.hpp"
 
 namespace ves {
 namespace {
@@ -133,8 +133,8 @@ TEST(Scene, TheArmEndsInThePlatformAndStandsAtItsRoot) {
   EXPECT_LT((Vec3(tip[0], tip[1], tip[2]) - x.head<3>()).norm(), 1e-6);
 }
 
-/// The PUMA with looks: base a box, link 2 a mesh that is no STL over a collision that is, link 3 a
-/// sphere and a cylinder, link 4 a mesh that is nowhere.
+/// The PUMA with looks: base a box, link 2 no visual but a mesh to collide with, link 3 a sphere
+/// and a cylinder, link 4 a mesh that is nowhere.
 class Looks : public testing::Test {
  protected:
   void SetUp() override {
@@ -158,10 +158,10 @@ class Looks : public testing::Test {
     };
     const std::string visual = "<visual><geometry>", end = "</geometry></visual>";
     dress("link_0", visual + "<box size='0.1 0.2 0.3'/>" + end);
-    dress("link_2", visual + "<mesh filename='package://arm/meshes/two.dae'/>" + end +
-                        "<collision><origin xyz='0 0 0.5' rpy='0 0 1.5707963267948966'/><geometry>"
-                        "<mesh filename='package://arm/meshes/two.stl' scale='0.1 0.1 0.1'/>"
-                        "</geometry></collision>");
+    dress("link_2",
+          "<collision><origin xyz='0 0 0.5' rpy='0 0 1.5707963267948966'/><geometry>"
+          "<mesh filename='package://arm/meshes/two.stl' scale='0.1 0.1 0.1'/>"
+          "</geometry></collision>");
     dress("link_3", visual + "<sphere radius='0.04'/>" + end + visual +
                         "<cylinder radius='0.03' length='0.4'/>" + end);
     dress("link_4", visual + "<mesh filename='package://arm/meshes/none.stl'/>" + end);
@@ -212,20 +212,47 @@ TEST_F(Looks, AreDrawnWhereTheDescriptionHasThem) {
 TEST_F(Looks, AMeshThatIsNoneIsNamed) {
   const std::string good = test::readText((folder_ / "arm/meshes/two.stl").string());
   const std::string nan("\0\0\xc0\x7f", 4);
-  for (const auto& [bytes, why] : std::map<std::string, std::string>{
-           {"", "0 corners"},
-           {good.substr(0, 100), "0 corners"},
-           {good.substr(0, 100) + nan + good.substr(104), "a corner at [0, nan"},
-           {"solid\nvertex 1 2\n", "vertex 1, want three numbers"},
-           {"solid\nvertex 1 2 3\n", "1 corners, want three a triangle"}}) {
+  for (const std::string& bytes :
+       {std::string(), good.substr(0, 100), good.substr(0, 96) + nan + good.substr(100),
+        std::string("solid\nvertex 1 2\n"), std::string("solid\nvertex 1 2 3\n")}) {
     write("arm/meshes/two.stl", bytes);
     const auto warnings = scene().warnings();
-    ASSERT_EQ(warnings.size(), 2u) << why;
-    EXPECT_NE(warnings[0].find("two.stl: no STL mesh: " + why), std::string::npos) << warnings[0];
+    ASSERT_EQ(warnings.size(), 2u) << bytes;
+    EXPECT_NE(warnings[0].find("two.stl: no mesh: "), std::string::npos) << warnings[0];
   }
-  write("arm/meshes/two.stl", test::readText((folder_ / "arm/meshes/text.stl").string()));
-  EXPECT_EQ(scene().warnings().size(), 1u);  // as text it is the same
-  EXPECT_EQ(shapes("mesh", "link2")[0]["triangles"], base64({0, 0, 0, 0.1f, 0, 0, 0, 0.2f, 0}));
+  // As text it is the same, and so it is with bytes behind its end.
+  for (const std::string& bytes :
+       {test::readText((folder_ / "arm/meshes/text.stl").string()), good + "1234567"}) {
+    write("arm/meshes/two.stl", bytes);
+    EXPECT_EQ(scene().warnings().size(), 1u);
+    EXPECT_EQ(shapes("mesh", "link2")[0]["triangles"], base64({0, 0, 0, 0.1f, 0, 0, 0, 0.2f, 0}));
+  }
+}
+
+TEST_F(Looks, MeshesOfOtherKindsHaveTheirColours) {
+  write("arm/meshes/a b.obj",
+        "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 2 0\nv 0 0 3\nusemtl red\nf 1 2 3\nusemtl blue\nf 1 3 "
+        "4\n");
+  write("arm/meshes/a.mtl", "newmtl red\nKd 1 0 0\nnewmtl blue\nKd 0 0 1\n");
+  const std::string text = test::readText((folder_ / "dressed.urdf").string());
+  const std::string named = "package://arm/meshes/two.stl' scale='0.1 0.1 0.1'";
+  const auto with = [&](const std::string& mesh) {
+    std::string other = text;
+    other.replace(other.find(named), named.size(), mesh);
+    write("dressed.urdf", other);
+    return shapes("mesh", "link2");
+  };
+  unsetenv("ROS_PACKAGE_PATH");  // found beside the description, and in the folders above it
+  for (const char* name : {"arm/meshes/a b.obj", "arm/meshes/a%20b.obj",
+                           "package://arm/meshes/a%20b.obj", "model://arm/meshes/a%20b.obj"}) {
+    const auto parts = with(std::string(name) + "' scale='1 -1 1'");
+    ASSERT_EQ(parts.size(), 2u) << name;
+    EXPECT_EQ(parts[0]["colour"], 0xff0000);
+    EXPECT_EQ(parts[1]["colour"], 0x0000ff);
+    EXPECT_EQ(parts[0]["triangles"], base64({0, -0.0f, 0, 1, -0.0f, 0, 0, -2, 0}));
+  }
+  with("arm/meshes/a b.obj' scale='1000 1000 1000'");
+  EXPECT_NE(scene().warnings()[0].find("reaches 3000 m: is it in mm"), std::string::npos);
 }
 
 TEST(Scene, WithoutAnArmThereIsNone) {

@@ -65,9 +65,12 @@ WorkspaceUse workspaceUse(const Geometry& g, double translation, double rotation
     use.leg_least = use.leg_least.cwiseMin(L);
     use.leg_most = use.leg_most.cwiseMax(L);
     use.joint_angle = std::max(use.joint_angle, largestJointAngle(g, X_IP));
-    use.clearance = std::min(use.clearance, nearestLegs(g, X_IP).distance);
+    if (const double d = nearestLegs(g, X_IP).distance; d < use.clearance)
+      use.clearance = d, use.nearest = x;
     use.plate_angle = std::min(use.plate_angle, flattestLeg(g, X_IP).angle);
-    use.condition = std::max(use.condition, conditionNumber(g, X_IP));
+    // Not a number is as bad as can be.
+    if (const double c = conditionNumber(g, X_IP); !(c <= use.condition))
+      use.condition = std::isnan(c) ? HUGE_VAL : c, use.worst = x;
   };
   look(Vec6::Zero());
   Vec6 farthest;

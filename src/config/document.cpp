@@ -105,6 +105,7 @@ class Converter {
         refuse(fmt::format("tag !{}, want !found, !derived, !substitute or !replace", value.tag));
       }
     }
+    std::vector<Value> merged;  // of YAML's merge key, <<
     switch (node.Type()) {
       case YAML::NodeType::Undefined:
       case YAML::NodeType::Null: break;
@@ -122,6 +123,10 @@ class Converter {
         for (const auto& entry : node) {
           if (!entry.first.IsScalar()) refuse("a key that is not a word");
           const std::string& key = entry.first.Scalar();
+          if (key == "<<") {
+            merged.push_back(convert(entry.second, depth + 1));
+            continue;
+          }
           if (value.find(key))
             throw InputError(
                 fmt::format("{}:{}: {}: given twice", *file_, entry.first.Mark().line + 1, key));
@@ -131,15 +136,39 @@ class Converter {
           if (value.children.back().kind == Value::Kind::kNull)
             value.children.back().line = entry.first.Mark().line + 1;
         }
+        for (const Value& one : merged)
+          if (one.kind == Value::Kind::kList)
+            for (const Value& each : one.children) mergeInto(value, each);
+          else
+            mergeInto(value, one);
         break;
     }
     return value;
   }
 
  private:
+  /// Keys that `value` has stay as they are.
+  void mergeInto(Value& value, const Value& from) const {
+    if (from.kind != Value::Kind::kMap)
+      throw InputError(fmt::format("{}:{}: <<: want a map, or a list of maps", *file_, from.line));
+    for (std::size_t i = 0; i < from.keys.size(); ++i)
+      if (!value.find(from.keys[i])) value.put(from.keys[i], from.children[i]);
+  }
+
   std::shared_ptr<const std::string> file_;
   int count_ = 0;
 };
+
+/// "; a tab indents, want blanks" where a line up to that of the error begins so.
+std::string tabBefore(const std::string& text, int line) {
+  std::istringstream in(text);
+  std::string one;
+  for (int i = 0; i <= line && std::getline(in, one); ++i)
+    if (const std::size_t first = one.find_first_not_of(' ');
+        first != std::string::npos && one[first] == '\t')
+      return fmt::format("; a tab indents line {}, want blanks", i + 1);
+  return {};
+}
 
 /// `over` wins; maps merge key by key, everything else is replaced.
 void merge(Value& base, Value over) {
@@ -206,7 +235,8 @@ Value parse(const std::string& text, const std::string& name) {
     requireOneDocument(text, name);
     return Converter(name).convert(YAML::Load(text));
   } catch (const YAML::Exception& error) {
-    throw InputError(fmt::format("{}:{}: not YAML: {}", name, error.mark.line + 1, error.msg));
+    throw InputError(fmt::format("{}:{}: not YAML: {}{}", name, error.mark.line + 1, error.msg,
+                                 tabBefore(text, error.mark.line)));
   }
 }
 
@@ -282,17 +312,34 @@ Value parseDocument(const std::string& text, const std::string& name) {
   return value;
 }
 
+/// What `from` and `urdf` name is a path, whatever YAML would make of its letters.
+static bool isFileOf(const std::string& key, const std::string& given) {
+  std::error_code error;
+  return (key == "from" || key == "urdf") && std::filesystem::is_regular_file(given, error);
+}
+
+static Value scalar(const std::string& text, const std::string& name) {
+  Value out;
+  out.kind = Value::Kind::kScalar;
+  out.text = text;
+  out.file = std::make_shared<const std::string>(name);
+  out.line = 1;
+  return out;
+}
+
 void applyOverride(Value& document, const std::string& assignment) {
   const std::size_t equals = assignment.find('=');
   if (equals == std::string::npos || equals == 0)
     throw InputError(fmt::format("--set {}: want key.path=value", assignment));
-  Value leaf = parse(assignment.substr(equals + 1), "--set " + assignment);
-  leaf.whole = true;
   std::vector<std::string> keys;
   for (std::size_t begin = 0, dot = 0; dot < equals; begin = dot + 1) {
     dot = std::min(assignment.find('.', begin), equals);
     keys.push_back(assignment.substr(begin, dot - begin));
   }
+  const std::string given = assignment.substr(equals + 1);
+  Value leaf = isFileOf(keys.back(), given) ? scalar(given, "--set " + assignment)
+                                            : parse(given, "--set " + assignment);
+  leaf.whole = true;
   Value* at = &document;
   const auto entry = [&](const std::string& key) -> Value& {
     std::size_t index = 0;
@@ -341,7 +388,7 @@ std::string emit(const Value& document) {
 std::filesystem::path findFile(const std::string& kind, const std::string& name,
                                const std::filesystem::path& folder) {
   const std::filesystem::path given(name);
-  if (given.extension() == ".yaml") return given;
+  if (given.extension() == ".yaml" || given.extension() == ".yml") return given;
   const std::filesystem::path named = folder / (name + ".yaml");
   std::error_code error;
   if (!name.empty() && std::filesystem::exists(named, error)) return named;

@@ -78,12 +78,18 @@ Experiment build(const Value& document) {
       out.name.find_first_not_of(
           "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-") != std::string::npos)
     root.fail("name", "want letters, digits, _ and -; folders are named after it");
+  constexpr std::size_t kLongest = 100;  // [B] with a time behind it, of a folder's name
+  if (out.name.size() > kLongest)
+    root.fail("name", fmt::format("has {} letters, want at most {}: folders are named after it",
+                                  out.name.size(), kLongest));
   out.description = root.text("description");
   out.plant.seed = static_cast<std::uint32_t>(root.integer("seed", 0, UINT32_MAX));
 
   ControllerConfig& c = out.controller;
   plant::PlantConfig& p = out.plant;
-  c.gravity = Vec3(0.0, 0.0, -root.number("gravity_m_per_s2", 0.0, 100.0));
+  constexpr const char* kGravity = "gravity_m_per_s2";  // downwards, or a vector in {I}
+  c.gravity = root.isList(kGravity) ? Vec3(root.vector(kGravity, 3, -100.0, 100.0))
+                                    : Vec3(0.0, 0.0, -root.number(kGravity, 0.0, 100.0));
 
   readController(root.section("controller"), c);
   c.geometry = readGeometry(root.section("platform"));

@@ -7,6 +7,17 @@
 
 namespace ves {
 
+/// A guess where legs are longer than any that are built.
+static std::string unitOf(const WorkspaceUse& use) {
+  constexpr double kLongest = 5.0;  // [m]
+  const double most = use.leg_most.maxCoeff();
+  return most > kLongest ? fmt::format(
+                               "; legs of {:.3g} m: are the platform's lengths in inches or "
+                               "mm, and not in m?",
+                               most)
+                         : "";
+}
+
 Legs readLegs(Section s, const WorkspaceUse& use) {
   Legs legs;
   legs.gains.K_P = static_cast<int>(s.integer("K_P", 1, 1'000'000));
@@ -27,9 +38,9 @@ Legs readLegs(Section s, const WorkspaceUse& use) {
   const double range = legs.transducer.scale * kMaxLegCount,
                length = legs.actuator.length_max - legs.actuator.length_min;
   if (length > range)
-    s.fail("counts_per_in", fmt::format("the stroke of {:.4f} m takes more than 14 bits, want at "
-                                        "most {:.4g}",
-                                        length, kMetrePerInch * kMaxLegCount / length));
+    s.fail("counts_per_in",
+           fmt::format("the stroke of {:.4f} m takes more than 14 bits, want at most {:.4g}{}",
+                       length, kMetrePerInch * kMaxLegCount / length, unitOf(use)));
   if (legs.actuator.length_min < legs.transducer.offset ||
       legs.actuator.length_max > legs.transducer.offset + range)
     s.fail("offset_m",
@@ -70,8 +81,9 @@ Sensor readSensor(Section s) {
   climate.finish();
   if (!inverse(m.S_proc()).allFinite())
     s.fail("sensitivity_uv_per_v", "is singular, want a matrix that has an inverse");
-  out.X_PS = {Vec3(1.0, -1.0, -1.0).asDiagonal().toDenseMatrix(),  // 180 degrees about x
-              s.vector("position_m", 3, -10.0, 10.0)};
+  const Vec3 upside_down(180.0, 0.0, 0.0);  // the report's, and of configurations without the key
+  const Vec3 rpy = s.has("rpy_deg") ? Vec3(s.vector("rpy_deg", 3, -360.0, 360.0)) : upside_down;
+  out.X_PS = {rotationOfDegrees(rpy), s.vector("position_m", 3, -10.0, 10.0)};
   out.top_plate_S = readBox(s.section("top_plate"));
   s.finish();
   return out;

@@ -80,6 +80,34 @@ std::array<Vec3, kLegs> readJoints(Section& s, const char* key) {
   return out;
 }
 
+namespace {
+
+// [-] of the Jacobian. 1 is the best there is; the report's machine has 1.3 at home.
+constexpr double kNearSingular = 100.0;
+
+std::string poseText(const Vec6& x) {
+  std::string out;
+  for (int i = 0; i < 6; ++i) {
+    const Coordinate& c = coordinate(i);
+    if (x(i) != 0.0)
+      out += fmt::format("{}{} {:.4g} {}", out.empty() ? "" : ", ", c.name, x(i) * c.shown,
+                         c.shown_unit);
+  }
+  return out.empty() ? "home" : out;
+}
+
+/// Legs that touch there are legs that cross.
+void requireApart(const Section& s, std::string_view key, const Geometry& g, const Vec6& x) {
+  constexpr double kTouch = 0.005;  // [-] of a leg's length
+  const Transform X_IP = g.fromHome(Pose::from(x));
+  const LegGap gap = nearestLegs(g, X_IP);
+  if (!(gap.distance > kTouch * legLengths(g, X_IP).minCoeff()))
+    s.fail(key, fmt::format("at {} legs {} and {} cross: their axes are {:.2g} mm apart",
+                            poseText(x), gap.first + 1, gap.second + 1, gap.distance * 1e3));
+}
+
+}  // namespace
+
 Geometry readGeometry(Section s) {
   Geometry g;
   g.p_IBi_I = readJoints(s, "base_joints_m");
@@ -92,9 +120,24 @@ Geometry readGeometry(Section s) {
     s.fail("home_height_m", fmt::format("leg {} stands at {:.1f} deg to a plate at home, want more "
                                         "than 0: the platform above the base",
                                         slope.leg + 1, slope.angle / kDegree));
-  if (!(conditionNumber(g, home) < 1e9))
-    s.fail("platform_joints_m", "the platform is singular at home: its legs cannot hold it");
+  if (const double c = conditionNumber(g, home); !(c <= kNearSingular))
+    s.fail("platform_joints_m",
+           fmt::format("the platform is near singular at home (condition number {:.2g}, want at "
+                       "most {}): its legs cannot hold it; are the joints numbered alike?",
+                       c, kNearSingular));
+  requireApart(s, "platform_joints_m", g, Vec6::Zero());
   return g;
+}
+
+WorkspaceUse readWorkspace(Section s, const Geometry& geometry) {
+  const WorkspaceUse use = workspaceUse(geometry, s.number("translation_m", kTiny, 10.0),
+                                        s.number("rotation_deg", kTiny, 85.0) * kDegree);
+  if (!(use.condition <= kNearSingular))
+    s.fail("rotation_deg", fmt::format("inside of the workspace, at {}, the platform is near "
+                                       "singular (condition number {:.2g}, want at most {})",
+                                       poseText(use.worst), use.condition, kNearSingular));
+  requireApart(s, "rotation_deg", geometry, use.nearest);
+  return use;
 }
 
 Platform loadPlatform(const std::filesystem::path& file,

@@ -5,6 +5,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <fstream>
 
 namespace ves {
 
@@ -127,10 +128,19 @@ Robot readRobot(Section s, const Value& document) {
   return robot;
 }
 
+/// By what is in it, whatever it is called; a pointer to a large file stands for a URDF.
+static bool looksLikeXml(const std::string& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::string head(64, '\0');
+  in.read(head.data(), std::ssize(head));
+  const std::size_t first = head.find_first_not_of(" \t\r\n\xef\xbb\xbf");
+  return first != std::string::npos &&
+         (head[first] == '<' || head.compare(first, 19, "version https://git") == 0);
+}
+
 LoadedRobot loadRobot(const std::string& file, const std::vector<std::string>& overrides) {
   Value document = parseDocument("{}", file);
-  const bool urdf = std::filesystem::path(file).extension() == ".urdf";
-  applyOverride(document, fmt::format("robot.{}={}", urdf ? "urdf" : "from", file));
+  applyOverride(document, fmt::format("robot.{}={}", looksLikeXml(file) ? "urdf" : "from", file));
   for (const std::string& one : overrides) applyOverride(document, "robot." + one);
   const Value& value = *document.find("robot");
   Section s(value, "robot");

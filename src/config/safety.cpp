@@ -55,11 +55,6 @@ void readLimit(Section& s, const Limit<int>& limit, int) {
 
 }  // namespace
 
-WorkspaceUse readWorkspace(Section s, const Geometry& geometry) {
-  return workspaceUse(geometry, s.number("translation_m", kTiny, 10.0),
-                      s.number("rotation_deg", kTiny, 85.0) * kDegree);
-}
-
 SafetyLimits readSafety(Section s, const Geometry& geometry, const WorkspaceUse& use,
                         const Legs& legs, double volts_per_count) {
   const SafetyLimits derived =

@@ -40,6 +40,11 @@ bool Section::has(std::string_view key) {
   return value_->find(key) != nullptr;
 }
 
+bool Section::isList(std::string_view key) {
+  const Value* value = has(key) ? value_->find(key) : nullptr;
+  return value && value->kind == Value::Kind::kList;
+}
+
 const Value& Section::need(std::string_view key) {
   used_.emplace(key);
   const Value* value = value_->find(key);

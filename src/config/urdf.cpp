@@ -60,6 +60,7 @@ class UrdfTree::Impl {
       int frame = -1;
     };
     std::map<std::string, Carried> carried;
+    out.file = file_;
     out.warnings = urdf_.warnings;
     out.fastest.setConstant(HUGE_VAL);
     for (const Joint& joint : joints_) {

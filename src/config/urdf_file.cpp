@@ -10,8 +10,8 @@
 #include <set>
 
 #include "spelling.hpp"
+#include "ves/config/xml.hpp"
 #include "ves/math/dense.hpp"
-#include "xml.hpp"
 
 namespace ves {
 namespace {
@@ -510,14 +510,20 @@ class Reader {
 
   // --- Of the picture alone
 
-  /// Colours are not drawn.
-  static void readMaterial(Element& material) {
-    if (!material.attribute("name")) material.warn(material.line(), "a material without a name");
+  /// A colour of its own, or that of its name.
+  std::optional<Vec3> readMaterial(Element& material) {
+    const std::string* name = material.attribute("name");
+    if (!name) material.warn(material.line(), "a material without a name");
+    std::optional<Vec3> out;
     if (auto color = material.child("color")) {
-      color->numbers<4>("rgba");
+      out = color->numbers<4>("rgba").head<3>().cwiseMax(0.0).cwiseMin(1.0);
       color->finish();
+      if (name) colours_[*name] = *out;
+    } else if (const auto known = colours_.find(name ? *name : ""); known != colours_.end()) {
+      out = known->second;
     }
     material.finish();
+    return out;
   }
 
   Visual readShape(Element& shape) {
@@ -566,6 +572,7 @@ class Reader {
 
   XmlElement document_;
   Warnings warnings_;
+  std::map<std::string, Vec3> colours_;  // of materials by name
 };
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "xml.hpp"
+#include "ves/config/xml.hpp"
 
 #include <expat.h>
 #include <fmt/format.h>

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/devices/net_ft.hpp"
 
+#include <curl/curl.h>
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <netdb.h>
-#include <poll.h>
 #include <sys/socket.h>
 #include <time.h>
 #include <unistd.h>
@@ -22,13 +22,6 @@ namespace {
 constexpr int kPatience = 2000;                     // [ms] for the sensor's web page
 constexpr std::int64_t kSilence = 500'000'000;      // [ns]
 constexpr std::int64_t kLookAgain = 1'000'000'000;  // [ns] at the calibration
-
-struct Descriptor {
-  int number = -1;
-  ~Descriptor() {
-    if (number >= 0) close(number);
-  }
-};
 
 std::string nameOf(const NetFtAddress& address, int port) {
   return fmt::format("force sensor {}:{}", address.host, port);
@@ -55,47 +48,59 @@ int connected(const NetFtAddress& address, int port, int type) {
 
 }  // namespace
 
-std::string fetchNetFtXml(const NetFtAddress& address, int patience) {
-  constexpr std::size_t kLongest = 65536;  // [B]
+NetFtPage fetchNetFtXml(const NetFtAddress& address, int patience) {
+  static const CURLcode ready = curl_global_init(CURL_GLOBAL_DEFAULT);
+  const std::unique_ptr<CURL, decltype(&curl_easy_cleanup)> curl(curl_easy_init(),
+                                                                 curl_easy_cleanup);
   const auto fail = [&](const std::string& why) {
     throw InputError(
         fmt::format("{}: /netftapi2.xml: {}", nameOf(address, address.http_port), why));
   };
-  const Descriptor fd{connected(address, address.http_port, SOCK_STREAM)};
-  const std::int64_t until = monotonicNow() + patience * 1'000'000LL;
-  const auto wait = [&](short events) {
-    const std::int64_t left = (until - monotonicNow()) / 1'000'000;
-    pollfd p{fd.number, events, 0};
-    if (left <= 0 || poll(&p, 1, static_cast<int>(left)) <= 0) fail("no answer");
+  if (ready != CURLE_OK || !curl) fail("no HTTP");
+  NetFtPage page;
+  const auto take = +[](char* data, std::size_t one, std::size_t n, void* to) -> std::size_t {
+    constexpr std::size_t kLongest = 65536;  // [B]
+    auto& text = *static_cast<std::string*>(to);
+    if (text.size() + one * n > kLongest) return 0;
+    text.append(data, one * n);
+    return one * n;
   };
-  wait(POLLOUT);
-  const std::string request =
-      fmt::format("GET /netftapi2.xml HTTP/1.0\r\nHost: {}\r\n\r\n", address.host);
-  if (send(fd.number, request.data(), request.size(), MSG_NOSIGNAL) !=
-      static_cast<ssize_t>(request.size()))
-    fail(std::strerror(errno));
-  std::string answer;
-  char buffer[4096];
-  for (;;) {
-    wait(POLLIN);
-    const ssize_t got = recv(fd.number, buffer, sizeof buffer, 0);
-    if (got == 0) break;
-    if (got < 0 && (errno == EAGAIN || errno == EINTR)) continue;
-    if (got < 0) fail(std::strerror(errno));
-    answer.append(buffer, static_cast<std::size_t>(got));
-    if (answer.size() > kLongest) fail("longer than 64 kB");
-  }
-  if (answer.rfind("HTTP/1.", 0) != 0 || answer.substr(8, 4) != " 200")
-    fail(fmt::format("answers '{}'",
-                     answer.substr(0, std::min<std::size_t>(answer.find_first_of("\r\n"), 60))));
-  return answer;
+  const bool v6 = address.host.find(':') != std::string::npos;
+  const std::string url = fmt::format("http://{}{}{}:{}/netftapi2.xml", v6 ? "[" : "", address.host,
+                                      v6 ? "]" : "", address.http_port);
+  char error[CURL_ERROR_SIZE] = "";
+  curl_easy_setopt(curl.get(), CURLOPT_URL, url.c_str());
+  curl_easy_setopt(curl.get(), CURLOPT_PROTOCOLS_STR, "http");
+  curl_easy_setopt(curl.get(), CURLOPT_PROXY, "");
+  curl_easy_setopt(curl.get(), CURLOPT_NOSIGNAL, 1L);
+  curl_easy_setopt(curl.get(), CURLOPT_TIMEOUT_MS, static_cast<long>(patience));
+  curl_easy_setopt(curl.get(), CURLOPT_ERRORBUFFER, error);
+  curl_easy_setopt(curl.get(), CURLOPT_WRITEFUNCTION, take);
+  curl_easy_setopt(curl.get(), CURLOPT_WRITEDATA, &page.xml);
+  const CURLcode result = curl_easy_perform(curl.get());
+  long status = 0;
+  const char* ip = nullptr;
+  curl_easy_getinfo(curl.get(), CURLINFO_RESPONSE_CODE, &status);
+  curl_easy_getinfo(curl.get(), CURLINFO_PRIMARY_IP, &ip);
+  if (result == CURLE_WRITE_ERROR) fail("longer than 64 kB");
+  if (result == CURLE_OPERATION_TIMEDOUT) fail("no answer");
+  if (result != CURLE_OK) fail(*error ? error : curl_easy_strerror(result));
+  if (status >= 300 && status < 400)
+    fail(fmt::format("answers {}: it sends elsewhere, want the box itself", status));
+  if (status != 200) fail(fmt::format("answers {}", status));
+  if (ip) page.ip = ip;
+  return page;
 }
 
 NetFt::NetFt(const NetFtAddress& address, const Mat6& S_proc, std::int64_t window)
+    : NetFt(address, fetchNetFtXml(address, kPatience), S_proc, window) {}
+
+NetFt::NetFt(const NetFtAddress& address, const NetFtPage& page, const Mat6& S_proc,
+             std::int64_t window)
     : address_(address),
-      calibration_(netFtCalibration(fetchNetFtXml(address, kPatience))),
+      calibration_(netFtCalibration(page.xml)),
       stream_(calibration_, S_proc, window),
-      socket_(connected(address, address.port, SOCK_DGRAM)) {
+      socket_(connected({page.ip, address.port, address.http_port}, address.port, SOCK_DGRAM)) {
   const int on = 1, room = 1 << 20;
   setsockopt(socket_, SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof on);
   setsockopt(socket_, SOL_SOCKET, SO_RCVBUF, &room, sizeof room);
@@ -122,7 +127,7 @@ void NetFt::watchCalibration() {
     usleep(20'000);
     if (monotonicNow() < next) continue;
     try {
-      const NetFtCalibration now = netFtCalibration(fetchNetFtXml(address_, kPatience));
+      const NetFtCalibration now = netFtCalibration(fetchNetFtXml(address_, kPatience).xml);
       if (now != calibration_ && !changed_.exchange(true))
         fmt::print(stderr,
                    "{}: its calibration was {} and is {} now: a fault until it is read anew\n",

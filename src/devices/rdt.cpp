@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <sstream>
 
+#include "ves/config/xml.hpp"
 #include "ves/core/big_endian.hpp"
 #include "ves/core/errors.hpp"
 
@@ -21,27 +23,46 @@ void putBig(std::uint8_t* at, std::uint32_t value, int bytes) {
   for (int i = 0; i < bytes; ++i) at[i] = static_cast<std::uint8_t>(value >> (8 * (bytes - 1 - i)));
 }
 
-std::string_view textOf(std::string_view xml, const std::string& tag) {
-  const std::string open = "<" + tag + ">", close = "</" + tag + ">";
-  const std::size_t begin = xml.find(open);
-  const std::size_t end = begin == xml.npos ? xml.npos : xml.find(close, begin);
-  if (end == xml.npos) throw InputError(fmt::format("netftapi2.xml: {}: missing", tag));
-  return xml.substr(begin + open.size(), end - begin - open.size());
+[[noreturn]] void refuse(const std::string& tag, const std::string& why) {
+  throw InputError(fmt::format("netftapi2.xml: {}: {}", tag, why));
 }
 
-double positive(std::string_view xml, const std::string& tag) {
-  const std::string text(textOf(xml, tag));
-  char* end = nullptr;
-  const double value = std::strtod(text.c_str(), &end);
-  if (text.empty() || *end != '\0' || !(value > 1e-6) || !(value < 1e12))
-    throw InputError(
-        fmt::format("netftapi2.xml: {}: '{}', want a number above 0", tag, text.substr(0, 40)));
-  return value;
+/// Without the blanks around it; nothing where there is no such element.
+const std::string* find(const XmlElement& page, const std::string& tag) {
+  for (const XmlElement& one : page.children)
+    if (one.name == tag) return &one.text;
+  return nullptr;
+}
+
+const std::string& textOf(const XmlElement& page, const std::string& tag) {
+  const std::string* text = find(page, tag);
+  if (!text) refuse(tag, "missing");
+  return *text;
+}
+
+/// Numbers with semicolons between them.
+std::vector<double> numbersOf(const std::string& text, const std::string& tag) {
+  std::vector<double> out;
+  std::istringstream in(text);
+  for (std::string one; std::getline(in, one, ';');) {
+    char* end = nullptr;
+    out.push_back(std::strtod(one.c_str(), &end));
+    if (one.empty() || *end != '\0' || !std::isfinite(out.back()))
+      refuse(tag, fmt::format("'{}', want numbers", text.substr(0, 40)));
+  }
+  return out;
+}
+
+double positive(const XmlElement& page, const std::string& tag) {
+  const std::vector<double> values = numbersOf(textOf(page, tag), tag);
+  if (values.size() != 1 || !(values[0] > 1e-6) || !(values[0] < 1e12))
+    refuse(tag, fmt::format("'{}', want a number above 0", textOf(page, tag).substr(0, 40)));
+  return values[0];
 }
 
 struct Unit {
   const char* name;
-  double si;  // [N | N m]
+  double si;  // [N | N m | m | rad]
 };
 constexpr double kPound = 4.4482216152605, kFoot = 0.3048, kKilogram = 9.80665;
 constexpr Unit kForces[] = {{"N", 1.0},
@@ -66,16 +87,39 @@ constexpr Unit kTorques[] = {{"Nm", 1.0},
                              {"kgf-cm", 1e-2 * kKilogram},
                              {"kg-cm", 1e-2 * kKilogram}};
 
+constexpr Unit kLengths[] = {
+    {"m", 1.0}, {"cm", 1e-2}, {"mm", 1e-3}, {"in", kFoot / 12.0}, {"ft", kFoot}};
+constexpr Unit kAngles[] = {{"degrees", kDegree}, {"deg", kDegree}, {"radians", 1.0}, {"rad", 1.0}};
+
 template <std::size_t N>
-double unit(std::string_view xml, const std::string& tag, const Unit (&units)[N]) {
-  const std::string_view text = textOf(xml, tag);
+double unit(const XmlElement& page, const std::string& tag, const Unit (&units)[N]) {
+  const std::string& text = textOf(page, tag);
   std::string names;
   for (const Unit& u : units) {
     if (text == u.name) return u.si;
     names += fmt::format("{}{}", names.empty() ? "" : ", ", u.name);
   }
-  throw InputError(
-      fmt::format("netftapi2.xml: {}: '{}', want one of {}", tag, text.substr(0, 40), names));
+  refuse(tag, fmt::format("'{}', want one of {}", text.substr(0, 40), names));
+}
+
+/// The box reports the wrench in a frame of somebody's choice. Angles about more than one axis are
+/// refused: in which order they turn is not said.
+Transform toolTransform(const XmlElement& page) {
+  const std::string* given = find(page, "cfgtfx");
+  if (!given) return {};
+  const std::vector<double> values = numbersOf(*given, "cfgtfx");
+  if (values.size() != 6)
+    refuse("cfgtfx", fmt::format("'{}', want six numbers", given->substr(0, 60)));
+  Vec6 x = Vec6::Map(values.data());
+  if (x.isZero(0.0)) return {};
+  x.head<3>() *= unit(page, "scfgtdu", kLengths);
+  x.tail<3>() *= unit(page, "scfgtau", kAngles);
+  if ((x.tail<3>().array() != 0.0).count() > 1)
+    refuse("cfgtfx",
+           fmt::format("'{}' turns about more than one axis, want one at most: set it to 0 "
+                       "and use sensor.rpy_deg",
+                       given->substr(0, 60)));
+  return {rotation(x.tail<3>()), x.head<3>()};
 }
 
 }  // namespace
@@ -114,11 +158,16 @@ std::optional<RdtRecord> rdtRecord(const std::uint8_t* data, std::size_t size) n
   return r;
 }
 
-NetFtCalibration netFtCalibration(std::string_view xml) {
+NetFtCalibration netFtCalibration(const std::string& xml) {
+  const XmlElement page = parseXml(xml, "netftapi2.xml");
   NetFtCalibration out;
-  out.counts_per_newton = positive(xml, "cfgcpf") / unit(xml, "scfgfu", kForces);
-  out.counts_per_newton_metre = positive(xml, "cfgcpt") / unit(xml, "scfgtu", kTorques);
-  out.serial = textOf(xml, "cfgcalsn");
+  out.counts_per_newton = positive(page, "cfgcpf") / unit(page, "scfgfu", kForces);
+  out.counts_per_newton_metre = positive(page, "cfgcpt") / unit(page, "scfgtu", kTorques);
+  out.serial = textOf(page, "cfgcalsn");
+  out.X_ST = toolTransform(page);
+  if (const std::string* filter = find(page, "setuserfilter"); filter && *filter != "0")
+    refuse("setuserfilter", fmt::format("'{}': the box filters, and its wrench is late; want 0",
+                                        filter->substr(0, 40)));
   return out;
 }
 
@@ -138,7 +187,10 @@ RdtStream::RdtStream(const NetFtCalibration& c, const Mat6& S_proc, std::int64_t
   Vec6 per_count;
   per_count << Vec3::Constant(1.0 / c.counts_per_newton),
       Vec3::Constant(1.0 / c.counts_per_newton_metre);
-  counts_per_count_ = S_proc * per_count.asDiagonal();
+  Mat6 to_S;  // of a wrench about To in {T}
+  for (int i = 0; i < 6; ++i)
+    to_S.col(i) = transfer(c.X_ST, Wrench::from(Vec6(Vec6::Unit(i)))).stacked();
+  counts_per_count_ = S_proc * to_S * per_count.asDiagonal();
 }
 
 void RdtStream::take(const std::uint8_t* data, std::size_t size, std::int64_t time) noexcept {

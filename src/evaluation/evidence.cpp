@@ -4,24 +4,45 @@
 #include <fmt/format.h>
 
 #include "ves/analysis/platform.hpp"
+#include "ves/control/path_checks.hpp"
 #include "ves/core/coordinates.hpp"
 
 namespace ves {
 namespace {
 
-std::string legOutside(const Row& row, const SafetyLimits& limits) {
+/// What was to be commanded when a check of the path failed.
+struct Proposed {
+  Pose x;
+  Transform X_IP;
+  Vec6 L;  // [m]
+};
+
+/// A freeze commands the pose before once more: what failed is a period farther.
+Proposed proposed(const Row& row, const ControllerConfig& c) {
+  const auto at = [&](double t) {
+    const Vec6 x = Vec6::Map(row.state.x) + t * Vec6::Map(row.state.x_dot) +
+                   0.5 * t * t * Vec6::Map(row.state.x_ddot);
+    Proposed out{Pose::from(x), c.geometry.fromHome(Pose::from(x)), {}};
+    out.L = legLengths(c.geometry, out.X_IP);
+    return out;
+  };
+  const Proposed now = at(0.0);
+  const bool passes = !PathChecks(c.safety, c.geometry).pose(now.X_IP, now.x, now.L).any();
+  return passes ? at(c.periodSeconds()) : now;
+}
+
+std::string legOutside(const Proposed& p, const SafetyLimits& limits) {
   for (int i = 0; i < kLegs; ++i) {
-    const double L = row.state.leg[i];
-    if (L >= limits.leg_min && L <= limits.leg_max) continue;
-    return fmt::format("leg {} at {:.4f} m, want [{}, {}] (safety.leg_min_m, leg_max_m)", i + 1, L,
-                       limits.leg_min, limits.leg_max);
+    if (p.L(i) >= limits.leg_min && p.L(i) <= limits.leg_max) continue;
+    return fmt::format("leg {} at {:.4f} m, want [{}, {}] (safety.leg_min_m, leg_max_m)", i + 1,
+                       p.L(i), limits.leg_min, limits.leg_max);
   }
   return {};
 }
 
-std::string coordinateOutside(const Row& row, const SafetyLimits& limits) {
+std::string coordinateOutside(const Proposed& p, const SafetyLimits& limits) {
   for (int i = 0; i < 6; ++i) {
-    const double most = i < 3 ? limits.translation : limits.rotation, x = row.state.x[i];
+    const double most = i < 3 ? limits.translation : limits.rotation, x = p.x.stacked()(i);
     if (std::abs(x) <= most) continue;
     const Coordinate& c = coordinate(i);
     return fmt::format("{} at {:.1f} {}, want at most {:.1f} (safety.{})", c.name, x * c.shown,
@@ -30,19 +51,22 @@ std::string coordinateOutside(const Row& row, const SafetyLimits& limits) {
   return {};
 }
 
-/// The two legs that are nearest, and the leg that lies flattest on a plate.
-std::string legsTooClose(const Row& row, const Experiment& e) {
-  const Geometry& g = e.controller.geometry;
-  const SafetyLimits& limits = e.controller.safety;
-  const Transform X_IP = g.fromHome(Pose::from(Vec6::Map(row.state.x)));
-  const LegGap gap = nearestLegs(g, X_IP);
+/// The two legs that are nearest, or the leg that lies flattest on a plate.
+std::string legsTooClose(const Proposed& p, const Geometry& g, const SafetyLimits& limits) {
+  const LegGap gap = nearestLegs(g, p.X_IP);
   if (!(gap.distance >= limits.leg_clearance))
     return fmt::format("legs {} and {} are {:.1f} mm apart, want {:.1f} (safety.leg_clearance_m)",
                        gap.first + 1, gap.second + 1, gap.distance * 1e3,
                        limits.leg_clearance * 1e3);
-  const LegSlope slope = flattestLeg(g, X_IP);
+  const LegSlope slope = flattestLeg(g, p.X_IP);
+  if (slope.angle >= limits.plate_angle) return {};
   return fmt::format("leg {} is {:.1f} deg from a plate, want {:.1f} (safety.plate_angle_deg)",
                      slope.leg + 1, slope.angle / kDegree, limits.plate_angle / kDegree);
+}
+
+std::string farFromRound(const Proposed& p, const Geometry& g, const SafetyLimits& limits) {
+  return fmt::format("condition number {:.3g}, want at most {:.3g} (safety.condition_number)",
+                     conditionNumber(g, p.X_IP), limits.condition);
 }
 
 std::string legBehind(const Row& row, const SafetyLimits& limits) {
@@ -92,15 +116,20 @@ std::string limitsOf(Check check, const Experiment& e) {
 
 std::string evidence(Check check, const Row& row, const Experiment& e) {
   const SafetyLimits& limits = e.controller.safety;
+  const Geometry& g = e.controller.geometry;
+  const Proposed p = proposed(row, e.controller);
+  std::string out;
   switch (check) {
-    case Check::kActuatorLimits: return legOutside(row, limits);
-    case Check::kMotionLimits: return coordinateOutside(row, limits);
-    case Check::kCollide: return legsTooClose(row, e);
-    case Check::kPositionError: return legBehind(row, limits);
-    case Check::kPressure: return row.has_sample ? pressure(row, e) : limitsOf(check, e);
-    case Check::kSensorSaturated: return row.has_sample ? saturated(row) : "";
-    default: return limitsOf(check, e);
+    case Check::kActuatorLimits: out = legOutside(p, limits); break;
+    case Check::kMotionLimits: out = coordinateOutside(p, limits); break;
+    case Check::kCollide: out = legsTooClose(p, g, limits); break;
+    case Check::kConditioning: out = farFromRound(p, g, limits); break;
+    case Check::kPositionError: out = legBehind(row, limits); break;
+    case Check::kPressure: out = row.has_sample ? pressure(row, e) : ""; break;
+    case Check::kSensorSaturated: out = row.has_sample ? saturated(row) : ""; break;
+    default: break;
   }
+  return out.empty() ? limitsOf(check, e) : out;
 }
 
 std::string stillnessViolation(const state_t& s, const Experiment& experiment) {

@@ -131,7 +131,7 @@
 
   function body(shape, look) {
     const material = new THREE.MeshStandardMaterial({
-      color: look.colour || (shape.world && 0x5b8c6a) || {plate: 0x6b7885, cylinder: 0x8d99a6, capsule: 0xe0903a, rod: 0xe0903a, sphere: 0xe0903a, box: 0xe0903a, mesh: 0xe0903a, axes: 0x333333}[shape.kind],
+      color: look.colour || shape.colour || (shape.world && 0x5b8c6a) || {plate: 0x6b7885, cylinder: 0x8d99a6, capsule: 0xe0903a, rod: 0xe0903a, sphere: 0xe0903a, box: 0xe0903a, mesh: 0xe0903a, axes: 0x333333}[shape.kind],
       transparent: look.opacity < 1, opacity: look.opacity || 1, roughness: 0.6, metalness: 0.1,
       depthWrite: !(look.opacity < 1)});
     const group = new THREE.Group();

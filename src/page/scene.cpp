@@ -7,7 +7,7 @@
 #include <cmath>
 #include <map>
 
-#include "stl.hpp"
+#include "mesh.hpp"
 #include "ves/control/safety_checks.hpp"
 #include "ves/core/coordinates.hpp"
 #include "ves/core/errors.hpp"
@@ -26,6 +26,13 @@ constexpr double kArmRadius = 0.12;     // [m]
 constexpr double kShortestLink = 1e-3;  // [m] worth drawing
 
 Json json(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
+
+/// 0xRRGGBB, as the page takes colours; never 0, which stands for none.
+int number(const Vec3& colour) {
+  int out = 0;
+  for (const double c : colour) out = out * 256 + static_cast<int>(std::lround(255.0 * c));
+  return std::max(out, 1);
+}
 
 /// Of the report's platform, to which the sizes above belong.
 constexpr double kJointRadius = 0.55;  // [m]
@@ -205,9 +212,31 @@ void Scene::addRobot(const UrdfRobot& description) {
   shapes.push_back({{"kind", "axes"}, {"frame", "tool"}, {"size", 0.15 * carried}});
 }
 
+/// A shape a material; `shape` has its place.
+void Scene::addMesh(const std::filesystem::path& file, const Visual& visual, Json shape) {
+  constexpr double kLarge = 100.0;  // [m]
+  double size = 0.0;
+  for (const MeshPart& part : readMesh(file)) {
+    std::vector<float> corners;
+    for (const Vec3& corner : part.corners) {
+      const Vec3 p = corner.cwiseProduct(visual.size);
+      size = std::max(size, p.cwiseAbs().maxCoeff());
+      for (const double x : p) corners.push_back(static_cast<float>(x));
+    }
+    shape["kind"] = "mesh";
+    shape["triangles"] = base64(corners);
+    if (!visual.colour && part.colour) shape["colour"] = number(*part.colour);
+    description_["shapes"].push_back(shape);
+  }
+  if (size > kLarge)
+    warnings_.push_back(fmt::format(
+        "{}: reaches {:.4g} m: is it in mm (scale=\"0.001 0.001 0.001\")?", file.string(), size));
+}
+
 /// Returns the links that are drawn: -1 is link 0.
 std::set<int> Scene::addVisuals(const UrdfRobot& description) {
   std::set<int> seen;
+  const std::filesystem::path folder = std::filesystem::path(description.file).parent_path();
   for (const Visual& visual : description.visuals) {
     const NamedFrame& frame = description.frames[static_cast<std::size_t>(visual.frame)];
     const Transform X =
@@ -217,6 +246,7 @@ std::set<int> Scene::addVisuals(const UrdfRobot& description) {
                   {"frame", frame.link < 0 ? "platform" : linkFrame(frame.link)},
                   {"position", json(X.p)},
                   {"quaternion", {q.x(), q.y(), q.z(), q.w()}}};
+    if (visual.colour) shape["colour"] = number(*visual.colour);
     switch (visual.kind) {
       case Visual::Kind::kBox:
         shape["kind"] = "box";
@@ -233,28 +263,26 @@ std::set<int> Scene::addVisuals(const UrdfRobot& description) {
         break;
       case Visual::Kind::kCapsule: {
         const Vec3 half = 0.5 * visual.size(1) * Vec3::UnitZ();
-        shape = capsule(shape["frame"], X * Vec3(-half), X * half, visual.size(0));
+        Json drawn = capsule(shape["frame"], X * Vec3(-half), X * half, visual.size(0));
+        if (visual.colour) drawn["colour"] = number(*visual.colour);
+        shape = drawn;
         break;
       }
       case Visual::Kind::kMesh: {
-        const std::filesystem::path file = findMesh(visual.mesh);
+        const std::filesystem::path file = findMesh(visual.mesh, folder);
         if (file.empty()) {
           warnings_.push_back(
               fmt::format("{}: not found, its link is drawn as a line", visual.mesh));
           continue;
         }
-        std::vector<float> corners;
         try {
-          for (const Vec3& p : readStl(file))
-            for (const double x :
-                 {p.x() * visual.size(0), p.y() * visual.size(1), p.z() * visual.size(2)})
-              corners.push_back(static_cast<float>(x));
+          addMesh(file, visual, shape);
         } catch (const InputError& error) {
           warnings_.push_back(error.what());
           continue;
         }
-        shape["kind"] = "mesh";
-        shape["triangles"] = base64(corners);
+        seen.insert(frame.link);
+        continue;
       }
     }
     description_["shapes"].push_back(shape);

@@ -34,8 +34,10 @@ struct WorkspaceUse {
   Vec6 leg_most = Vec6::Zero();   // [m]
   double joint_angle = 0.0;       // [rad] largest
   double clearance = 0.0;         // [m] least
+  Vec6 nearest = Vec6::Zero();    // [m, rad] where
   double plate_angle = 0.0;       // [rad] least
   double condition = 0.0;         // [-] largest
+  Vec6 worst = Vec6::Zero();      // [m, rad] where
 };
 /// `translation` [m] and `rotation` [rad] of each coordinate from home, either way.
 WorkspaceUse workspaceUse(const Geometry& geometry, double translation, double rotation);

@@ -72,6 +72,8 @@ class Section {
   Section(Value&& value, std::string path) = delete;
 
   bool has(std::string_view key);
+  /// It is there, and a list.
+  bool isList(std::string_view key);
   const std::vector<std::string>& keys() const { return value_->keys; }
 
   /// A number in [lo, hi]; NaN is in no interval.

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -35,9 +36,11 @@ struct Visual {
   Transform X_frame;         // its pose there
   Vec3 size = Vec3::Ones();  // [m] of a box; {radius, length along z, 0}; {radius, 0, 0}; [-] scale
   std::string mesh;          // file, as the description names it
+  std::optional<Vec3> colour;  // [-] red, green, blue
 };
 
 struct UrdfRobot {
+  std::string file;  // of the description, as it was named
   RobotModel model;
   std::vector<std::string> joint_names;  // of the joint values
   JointVector fastest;                   // [rad/s | m/s] of each; infinite where it is not said

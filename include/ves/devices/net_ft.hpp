@@ -12,6 +12,13 @@
 
 namespace ves::devices {
 
+/// The sensor's web page, and the address of the host's that answered.
+struct NetFtPage {
+  std::string xml, ip;
+};
+/// Throws InputError; `patience` [ms].
+NetFtPage fetchNetFtXml(const NetFtAddress& address, int patience);
+
 class NetFt : public ForceSensor {
  public:
   /// Reads the sensor's calibration from its web page and asks for records. A thread of its own
@@ -28,6 +35,8 @@ class NetFt : public ForceSensor {
   const RdtStream::Counters& counters() const noexcept { return stream_.counters(); }
 
  private:
+  NetFt(const NetFtAddress& address, const NetFtPage& page, const Mat6& S_proc,
+        std::int64_t window);
   void ask(std::int64_t now) noexcept;
   void watchCalibration();
 
@@ -39,8 +48,5 @@ class NetFt : public ForceSensor {
   std::atomic<bool> changed_{false}, over_{false};
   std::thread watcher_;
 };
-
-/// The sensor's web page. Throws InputError; `patience` [ms].
-std::string fetchNetFtXml(const NetFtAddress& address, int patience);
 
 }  // namespace ves::devices

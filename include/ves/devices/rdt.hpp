@@ -9,7 +9,6 @@
 #include <cstdint>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "ves/devices/devices.hpp"
@@ -41,12 +40,13 @@ std::optional<RdtRecord> rdtRecord(const std::uint8_t* data, std::size_t size) n
 struct NetFtCalibration {
   double counts_per_newton = 0.0;  // [-]
   double counts_per_newton_metre = 0.0;
-  std::string serial;  // of the calibration
+  std::string serial;   // of the calibration
+  Transform X_ST = {};  // where the box reports its wrench: its tool transform
 
   bool operator==(const NetFtCalibration&) const = default;
 };
-/// Throws InputError, naming the tag.
-NetFtCalibration netFtCalibration(std::string_view xml);
+/// Throws InputError, naming the tag. A low-pass filter of the box is refused: it would be late.
+NetFtCalibration netFtCalibration(const std::string& xml);
 std::string netFtXml(const NetFtCalibration& calibration, int records_per_second);
 
 /// The newest record of a stream that loses, repeats and reorders, or the mean of the newest ones,

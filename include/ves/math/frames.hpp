@@ -92,17 +92,32 @@ inline Wrench transfer(const Transform& X_AB, const Wrench& F_Bo_B) {
   return shift(rotate(X_AB.R, F_Bo_B), -X_AB.p);
 }
 
-/// R_IP = Rz(gamma) Ry(beta) Rx(alpha), (2.19). The page prints R(2,2) with a minus before
-/// cos(gamma) cos(alpha); a rotation has a plus there.
-inline Mat3 rotation(const Vec3& rpy) {
-  const double ca = std::cos(rpy.x()), sa = std::sin(rpy.x());
-  const double cb = std::cos(rpy.y()), sb = std::sin(rpy.y());
-  const double cg = std::cos(rpy.z()), sg = std::sin(rpy.z());
+/// R_IP = Rz(gamma) Ry(beta) Rx(alpha), (2.19), of the angles' cosines and sines. The page prints
+/// R(2,2) with a minus before cos(gamma) cos(alpha); a rotation has a plus there.
+inline Mat3 rotation(const Vec3& cosines, const Vec3& sines) {
+  const double ca = cosines.x(), sa = sines.x(), cb = cosines.y(), sb = sines.y(), cg = cosines.z(),
+               sg = sines.z();
   Mat3 R;
   R << cg * cb, cg * sb * sa - sg * ca, cg * sb * ca + sg * sa,  //
       sg * cb, sg * sb * sa + cg * ca, sg * sb * ca - cg * sa,   //
       -sb, cb * sa, cb * ca;
   return R;
+}
+inline Mat3 rotation(const Vec3& rpy) {
+  return rotation({std::cos(rpy.x()), std::cos(rpy.y()), std::cos(rpy.z())},
+                  {std::sin(rpy.x()), std::sin(rpy.y()), std::sin(rpy.z())});
+}
+/// The same of angles in degrees; quarter turns are exact.
+inline Mat3 rotationOfDegrees(const Vec3& rpy) {
+  const auto sine = [](double degrees) {
+    const double turn = std::remainder(degrees, 360.0);
+    return std::remainder(turn, 180.0) == 0.0  ? 0.0
+           : std::remainder(turn, 90.0) == 0.0 ? std::copysign(1.0, turn)
+                                               : std::sin(turn * kDegree);
+  };
+  const auto cosine = [&](double degrees) { return sine(degrees + 90.0); };
+  return rotation({cosine(rpy.x()), cosine(rpy.y()), cosine(rpy.z())},
+                  {sine(rpy.x()), sine(rpy.y()), sine(rpy.z())});
 }
 
 /// The angles of (2.19), |beta| < 90 degrees.

@@ -40,6 +40,8 @@ class Scene {
   void addFrame(const std::string& name, const std::string& parent);
   void addRobot(const UrdfRobot& robot);
   std::set<int> addVisuals(const UrdfRobot& robot);
+  void addMesh(const std::filesystem::path& file, const Visual& visual,
+               nlohmann::ordered_json shape);
   void addArm();
   void addWorld(const Environment& environment);
   /// A large platform's robot and sensor are no larger.
