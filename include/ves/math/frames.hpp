@@ -21,6 +21,8 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "ves/math/layout.hpp"
+
 namespace ves {
 
 using Vec3 = Eigen::Vector3d;
@@ -116,8 +118,9 @@ inline Mat3 rotationOfDegrees(const Vec3& rpy) {
                                                : std::sin(turn * kDegree);
   };
   const auto cosine = [&](double degrees) { return sine(degrees + 90.0); };
-  return rotation({cosine(rpy.x()), cosine(rpy.y()), cosine(rpy.z())},
-                  {sine(rpy.x()), sine(rpy.y()), sine(rpy.z())});
+  const Mat3 R = rotation({cosine(rpy.x()), cosine(rpy.y()), cosine(rpy.z())},
+                          {sine(rpy.x()), sine(rpy.y()), sine(rpy.z())});
+  return R.array() + 0.0;  // no zero is negative
 }
 
 /// The angles of (2.19), |beta| < 90 degrees.
