@@ -17,8 +17,8 @@
 #include "ves/control/gravity_compensation.hpp"
 #include "ves/core/build.hpp"
 #include "ves/math/second_order.hpp"
-#include "ves/series/series.hpp"
 #include "ves/robot/newton_euler.hpp"
+#include "ves/series/series.hpp"
 #include "ves/srms/interaction.hpp"
 #include "ves/srms/modes.hpp"
 
@@ -85,6 +85,57 @@ py::tuple forwardMotionOf(const Geometry& g, const Vec6& pose, const Vec6& L_dot
   if (!forwardMotion(g, X_IP, {legLengths(g, X_IP), L_dot, L_ddot}, P))
     throw InputError("pose: the platform is singular there");
   return py::make_tuple((Vec6() << P.v, P.w).finished(), (Vec6() << P.a, P.alpha).finished());
+}
+
+py::tuple packedBody(const RigidBody& b) { return py::make_tuple(b.mass, b.p_BoBcm_B, b.I_Bcm_B); }
+RigidBody body(const py::handle& h) {
+  const auto t = h.cast<py::tuple>();
+  return {t[0].cast<double>(), t[1].cast<Vec3>(), t[2].cast<Mat3>()};
+}
+
+/// What pickle keeps of a robot.
+py::tuple packed(const RobotModel& robot) {
+  py::list links;
+  for (int i = 0; i < robot.size; ++i) {
+    const Link& l = robot.link(i);
+    links.append(py::make_tuple(l.type == JointType::kRevolute, l.parent, l.joint, l.ratio,
+                                l.offset, l.X_parent.R, l.X_parent.p, l.axis, l.lower, l.upper,
+                                packedBody(l.body),
+                                robot.own[static_cast<std::size_t>(l.joint)] != i));
+  }
+  return py::make_tuple(packedBody(robot.base), links);
+}
+
+RobotModel unpacked(const py::tuple& state) {
+  RobotModel robot;
+  robot.base = body(state[0]);
+  for (const py::handle one : state[1].cast<py::list>()) {
+    const auto t = one.cast<py::tuple>();
+    Link l;
+    l.type = t[0].cast<bool>() ? JointType::kRevolute : JointType::kPrismatic;
+    l.parent = t[1].cast<int>();
+    l.joint = t[2].cast<int>();
+    l.ratio = t[3].cast<double>();
+    l.offset = t[4].cast<double>();
+    l.X_parent = {t[5].cast<Mat3>(), t[6].cast<Vec3>()};
+    l.axis = t[7].cast<Vec3>();
+    l.lower = t[8].cast<double>();
+    l.upper = t[9].cast<double>();
+    l.body = body(t[10]);
+    robot.add(l, t[11].cast<bool>());
+  }
+  return robot;
+}
+
+Mat6 jacobianOf(const Geometry& g, const Vec6& pose) {
+  Mat6 J;
+  const Transform X_IP = g.fromHome(Pose::from(pose));
+  for (int i = 0; i < kLegs; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    const Vec3 r = X_IP.R * g.p_PPi_P[k], leg = (X_IP.p + r - g.p_IBi_I[k]).normalized();
+    J.row(i) << leg.transpose(), r.cross(leg).transpose();
+  }
+  return J;
 }
 
 py::tuple newtonEulerOf(const RobotModel& robot, const Eigen::VectorXd& q,
@@ -203,14 +254,31 @@ PYBIND11_MODULE(_core, m) {
 
   py::class_<Geometry>(m, "Geometry")
       .def(py::init(&geometryOf))
+      .def(py::pickle(
+          [](const Geometry& g) {
+            return py::make_tuple(stacked(g.p_IBi_I), stacked(g.p_PPi_P), g.home_height);
+          },
+          [](const py::tuple& t) {
+            return geometryOf(t[0].cast<Joints>(), t[1].cast<Joints>(), t[2].cast<double>());
+          }))
       .def_property_readonly("base_joints", [](const Geometry& g) { return stacked(g.p_IBi_I); })
       .def_property_readonly("platform_joints",
                              [](const Geometry& g) { return stacked(g.p_PPi_P); })
       .def_readonly("home_height", &Geometry::home_height);
   py::class_<RobotModel>(m, "RobotModel")
+      .def(py::pickle(&packed, &unpacked))
       .def_readonly("joints", &RobotModel::joints)
       .def_readonly("links", &RobotModel::size);
   py::class_<ModalModel>(m, "ModalModel")
+      .def(py::pickle(
+          [](const ModalModel& b) { return py::make_tuple(b.Phi, b.stiffness, b.damping); },
+          [](const py::tuple& t) {
+            ModalModel b;
+            b.Phi = t[0].cast<Eigen::MatrixXd>();
+            b.stiffness = t[1].cast<Eigen::VectorXd>();
+            b.damping = t[2].cast<Eigen::MatrixXd>();
+            return b;
+          }))
       .def_readonly("shapes", &ModalModel::Phi)
       .def_readonly("stiffness", &ModalModel::stiffness)
       .def_readonly("damping", &ModalModel::damping);
@@ -227,13 +295,14 @@ PYBIND11_MODULE(_core, m) {
   m.def("leg_motion", &legMotionOf);
   m.def("forward_pose", &forwardPoseOf);
   m.def("forward_motion", &forwardMotionOf);
+  m.def("jacobian", &jacobianOf);
   m.def("condition_number", [](const Geometry& g, const Vec6& pose) {
     return conditionNumber(g, g.fromHome(Pose::from(pose)));
   });
   m.def("load_robot", [](const std::string& name, const Path& config, const Strings& set) {
-    const bool urdf = Path(name).extension() == ".urdf";
+    const bool file = Path(name).has_extension() || std::filesystem::is_regular_file(name);
     const LoadedRobot loaded =
-        loadRobot(urdf ? name : findFile("robot", name, config / "robots").string(), set);
+        loadRobot(file ? name : findFile("robot", name, config / "robots").string(), set);
     return py::make_tuple(loaded.robot.model, loaded.robot.joint_names,
                           Eigen::VectorXd(loaded.q.head(loaded.robot.model.joints)));
   });

@@ -26,6 +26,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+if int(np.__version__.split(".")[0]) > 1:  # what it was compiled with ends the process there
+    raise ImportError(f"ves was built for NumPy 1, this is NumPy {np.__version__}: use Debian's python3, "
+                      "or pip install 'numpy<2'")
+
 from . import _core
 from ._core import InputError
 from .experiment_t import experiment_t
@@ -47,17 +51,45 @@ InputError.__module__ = __name__
 # --- arguments ----------------------------------------------------------------------------------------
 
 def _array(name: str, value, shape: tuple) -> np.ndarray:
-    """Finite numbers of this shape."""
-    try:
-        out = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        raise TypeError(f"{name}: want numbers of shape {shape}") from None
+    """Finite real numbers of this shape. What would lose something on the way to them is refused."""
+    out = _numbers(name, value, shape)
     if out.shape != shape:
         raise ValueError(f"{name}: has shape {out.shape}, want {shape}")
     if not np.isfinite(out).all():
         at = tuple(int(i) for i in np.argwhere(~np.isfinite(out))[0])
         raise ValueError(f"{name}{list(at) if at else ''}: {out[at]}, want finite numbers")
     return out
+
+
+def _numbers(name: str, value, shape: tuple) -> np.ndarray:
+    if isinstance(value, np.ma.MaskedArray):
+        raise TypeError(f"{name}: is a masked array, want plain numbers (.filled(), .compressed())")
+    try:
+        raw = np.asarray(value)
+        if raw.dtype.kind not in "iuf":
+            raise TypeError(f"{name}: holds {raw.dtype}, want real numbers of shape {shape}")
+        return raw.astype(float)
+    except ValueError:  # of lists of several lengths
+        raise TypeError(f"{name}: want numbers of shape {shape}") from None
+
+
+def _over(function, *arguments):
+    """function(arrays) of `arguments`, each (name, value, shape). A leading axis more makes it a batch: the
+    results are stacked along it, and arguments without it serve for all."""
+    arrays = [_numbers(name, value, shape) for name, value, shape in arguments]
+    sizes = {len(a) for a, (_, _, shape) in zip(arrays, arguments) if a.ndim == len(shape) + 1}
+    if not sizes:
+        return function(*(_array(*argument) for argument in arguments))
+    if len(sizes) > 1:
+        raise ValueError(f"{arguments[0][0]}: batches of {', '.join(map(str, sorted(sizes)))} do not go together")
+    def one(k):
+        return function(*(_array(f"{name}[{k}]" if a.ndim > len(shape) else name, a[k] if a.ndim > len(shape) else a,
+                                 shape)
+                          for a, (name, _, shape) in zip(arrays, arguments)))
+    results = [one(k) for k in range(sizes.pop())]
+    if results and isinstance(results[0], tuple):
+        return tuple(np.array(part) for part in zip(*results))
+    return np.array(results)
 
 
 def _number(name: str, value, low: float, high: float) -> float:
@@ -82,7 +114,11 @@ def _choice(name: str, value, allowed: Sequence[str]) -> str:
 def _settings(settings: Mapping[str, object]) -> list:
     """{"legs.tau_s": 0.01} as the commands' --set takes it; True as true, lists as they are."""
     def text(value):
-        if isinstance(value, bool):
+        if isinstance(value, np.ma.MaskedArray):
+            raise TypeError("settings: a masked array, want plain values")
+        if isinstance(value, np.ndarray) and value.ndim == 0:
+            value = value.item()
+        if isinstance(value, (bool, np.bool_)):
             return str(value).lower()
         if isinstance(value, (list, tuple, np.ndarray)):
             return "[" + ", ".join(text(v) for v in value) + "]"
@@ -95,20 +131,21 @@ def _settings(settings: Mapping[str, object]) -> list:
 # --- frames -------------------------------------------------------------------------------------------
 
 def rotation(angles: ArrayLike) -> np.ndarray:
-    """R_IP of X-Y-Z fixed angles {alpha, beta, gamma} [rad]; (3,) to (3, 3).
+    """R_IP of X-Y-Z fixed angles {alpha, beta, gamma} [rad]; (3,) to (3, 3), (N, 3) to (N, 3, 3).
 
     Rz(gamma) Ry(beta) Rx(alpha), (2.19). The page prints one sign that no rotation has.
     """
-    return _core.rotation(_array("angles", angles, (3,)))
+    return _over(_core.rotation, ("angles", angles, (3,)))
 
 
 def fixed_angles(R: ArrayLike) -> np.ndarray:
-    """The angles of (2.19) [rad] of a rotation matrix, |beta| < 90 degrees; (3, 3) to (3,)."""
-    R = _array("R", R, (3, 3))
-    off = np.abs(R.T @ R - np.eye(3)).max()
-    if not (off < 1e-6 and np.linalg.det(R) > 0):
-        raise ValueError(f"R: is {off:.2g} from orthogonal, or a reflection; want a rotation")
-    return _core.fixed_angles(R)
+    """The angles of (2.19) [rad] of a rotation matrix, |beta| < 90 degrees; (3, 3) to (3,), or N of them."""
+    def one(R):
+        off = np.abs(R.T @ R - np.eye(3)).max()
+        if not (off < 1e-6 and np.linalg.det(R) > 0):
+            raise ValueError(f"R: is {off:.2g} from orthogonal, or a reflection; want a rotation")
+        return _core.fixed_angles(R)
+    return _over(one, ("R", R, (3, 3)))
 
 
 def angle_rate_map(angles: ArrayLike) -> np.ndarray:
@@ -116,7 +153,7 @@ def angle_rate_map(angles: ArrayLike) -> np.ndarray:
 
     The inverse of (2.27b), in inertial axes.
     """
-    return _core.angle_rate_map(_array("angles", angles, (3,)))
+    return _over(_core.angle_rate_map, ("angles", angles, (3,)))
 
 
 # --- the Stewart platform -----------------------------------------------------------------------------
@@ -162,9 +199,18 @@ def load_platform(name: str, settings: Mapping[str, object] = None) -> Platform:
 
 
 def leg_lengths(platform: Platform, pose: ArrayLike) -> np.ndarray:
-    """Inverse kinematics: the six legs' lengths [m] at a pose; (6,) to (6,). (C.11), (C.12)."""
-    return _core.leg_lengths(_one_of("platform", platform, Platform)._core,
-                             _array("pose", pose, (6,)))
+    """Inverse kinematics: the six legs' lengths [m] at a pose; (6,) to (6,). (C.11), (C.12).
+
+    Here and below N poses at once, (N, 6), give N results.
+    """
+    core = _one_of("platform", platform, Platform)._core
+    return _over(lambda x: _core.leg_lengths(core, x), ("pose", pose, (6,)))
+
+
+def jacobian(platform: Platform, pose: ArrayLike) -> np.ndarray:
+    """J with leg rates = J {v, w}, P's linear and angular velocity in I; (6,) to (6, 6). (2.24)."""
+    core = _one_of("platform", platform, Platform)._core
+    return _over(lambda x: _core.jacobian(core, x), ("pose", pose, (6,)))
 
 
 def leg_motion(platform: Platform, pose: ArrayLike, rates: ArrayLike,
@@ -173,9 +219,9 @@ def leg_motion(platform: Platform, pose: ArrayLike, rates: ArrayLike,
 
     `rates` and `accelerations`: first and second derivatives of the pose's coordinates, (6,).
     """
-    return _core.leg_motion(_one_of("platform", platform, Platform)._core,
-                            _array("pose", pose, (6,)), _array("rates", rates, (6,)),
-                            _array("accelerations", accelerations, (6,)))
+    core = _one_of("platform", platform, Platform)._core
+    return _over(lambda *x: _core.leg_motion(core, *x), ("pose", pose, (6,)), ("rates", rates, (6,)),
+                 ("accelerations", accelerations, (6,)))
 
 
 def forward_pose(platform: Platform, lengths: ArrayLike, guess: ArrayLike = (0,) * 6) -> np.ndarray:
@@ -184,8 +230,8 @@ def forward_pose(platform: Platform, lengths: ArrayLike, guess: ArrayLike = (0,)
     Newton-Raphson on (2.22), (2.23) to 1e-9 m, from `guess`, a pose; of the up to 40 poses that six
     lengths allow it finds one near the guess. Raises InputError when there is none.
     """
-    return _core.forward_pose(_one_of("platform", platform, Platform)._core,
-                              _array("lengths", lengths, (6,)), _array("guess", guess, (6,)))
+    core = _one_of("platform", platform, Platform)._core
+    return _over(lambda *x: _core.forward_pose(core, *x), ("lengths", lengths, (6,)), ("guess", guess, (6,)))
 
 
 def forward_motion(platform: Platform, pose: ArrayLike, length_rates: ArrayLike,
@@ -195,10 +241,9 @@ def forward_motion(platform: Platform, pose: ArrayLike, length_rates: ArrayLike,
     (2.24) and (2.32), the latter with the whole of the second derivative. Raises InputError where the
     platform is singular.
     """
-    return _core.forward_motion(_one_of("platform", platform, Platform)._core,
-                                _array("pose", pose, (6,)),
-                                _array("length_rates", length_rates, (6,)),
-                                _array("length_accelerations", length_accelerations, (6,)))
+    core = _one_of("platform", platform, Platform)._core
+    return _over(lambda *x: _core.forward_motion(core, *x), ("pose", pose, (6,)),
+                 ("length_rates", length_rates, (6,)), ("length_accelerations", length_accelerations, (6,)))
 
 
 def condition_number(platform: Platform, pose: ArrayLike) -> float:
@@ -206,8 +251,8 @@ def condition_number(platform: Platform, pose: ArrayLike) -> float:
 
     Lengths are counted in the radius of the platform's joints.
     """
-    return _core.condition_number(_one_of("platform", platform, Platform)._core,
-                                  _array("pose", pose, (6,)))
+    core = _one_of("platform", platform, Platform)._core
+    return _over(lambda x: _core.condition_number(core, x), ("pose", pose, (6,)))
 
 
 # --- robots -------------------------------------------------------------------------------------------
@@ -219,8 +264,8 @@ class Robot:
     joints: np.ndarray  #: (n,) where they begin [rad | m]
     _core: object
 
-    def _values(self, name: str, value) -> np.ndarray:
-        return _array(name, value, (len(self.joint_names),))
+    def _values(self, name: str, value) -> tuple:
+        return name, value, (len(self.joint_names),)
 
     def __repr__(self) -> str:
         return f"<ves.Robot, {len(self.joint_names)} joints>"
@@ -238,7 +283,8 @@ def load_robot(name: str, settings: Mapping[str, object] = None) -> Robot:
 
 def link_poses(robot: Robot, q: ArrayLike) -> np.ndarray:
     """Homogeneous poses of every link that moves, in L0; joint values (n,) to (links, 4, 4)."""
-    return np.array(_core.link_poses(_one_of("robot", robot, Robot)._core, robot._values("q", q)))
+    core = _one_of("robot", robot, Robot)._core
+    return _over(lambda x: np.array(_core.link_poses(core, x)), robot._values("q", q))
 
 
 def newton_euler(robot: Robot, q: ArrayLike, q_dot: ArrayLike, q_ddot: ArrayLike,
@@ -251,10 +297,9 @@ def newton_euler(robot: Robot, q: ArrayLike, q_dot: ArrayLike, q_ddot: ArrayLike
     Earth {0, 0, 9.81}, in space 0. Returns the wrench (6,) about L0's origin that acts on the robot from
     what it stands on, in L0, and (n,) joint efforts [N m | N].
     """
-    return _core.newton_euler(_one_of("robot", robot, Robot)._core, robot._values("q", q),
-                              robot._values("q_dot", q_dot), robot._values("q_ddot", q_ddot),
-                              _array("w", w, (3,)), _array("alpha", alpha, (3,)),
-                              _array("a", a, (3,)))
+    core = _one_of("robot", robot, Robot)._core
+    return _over(lambda *x: _core.newton_euler(core, *x), robot._values("q", q), robot._values("q_dot", q_dot),
+                 robot._values("q_ddot", q_ddot), ("w", w, (3,)), ("alpha", alpha, (3,)), ("a", a, (3,)))
 
 
 def composite_body(robot: Robot, q: ArrayLike) -> tuple[float, np.ndarray, np.ndarray]:
@@ -262,7 +307,8 @@ def composite_body(robot: Robot, q: ArrayLike) -> tuple[float, np.ndarray, np.nd
 
     In L0; the inertia about the centre. [M_1] of (3.1).
     """
-    return _core.composite_body(_one_of("robot", robot, Robot)._core, robot._values("q", q))
+    core = _one_of("robot", robot, Robot)._core
+    return _over(lambda x: _core.composite_body(core, x), robot._values("q", q))
 
 
 def gravity_wrench(robot: Robot, q: ArrayLike, R_IL: ArrayLike = np.eye(3),
@@ -271,9 +317,8 @@ def gravity_wrench(robot: Robot, q: ArrayLike, R_IL: ArrayLike = np.eye(3),
 
     R_IL (3, 3) turns the coordinates of L0 into those of I; gravity [m/s^2] acts along -z of I.
     """
-    return _core.gravity_wrench(_one_of("robot", robot, Robot)._core, robot._values("q", q),
-                                _array("R_IL", R_IL, (3, 3)),
-                                _number("gravity", gravity, 0.0, 1e3))
+    core, g = _one_of("robot", robot, Robot)._core, _number("gravity", gravity, 0.0, 1e3)
+    return _over(lambda x, R: _core.gravity_wrench(core, x, R, g), robot._values("q", q), ("R_IL", R_IL, (3, 3)))
 
 
 # --- flexible bases -----------------------------------------------------------------------------------
@@ -337,9 +382,9 @@ def admittance_step(base: Base, eta: ArrayLike, eta_dot: ArrayLike, wrench: Arra
     The pose of the base is base.shapes @ eta. For damping of any form, coupled or not.
     """
     k = len(_one_of("base", base, Base).stiffness)
-    return _core.admittance_step(base._core, _array("eta", eta, (k,)),
-                                 _array("eta_dot", eta_dot, (k,)), _array("wrench", wrench, (6,)),
-                                 _number("dt", dt, -1e3, 1e3))
+    step = _number("dt", dt, -1e3, 1e3)
+    return _over(lambda *x: _core.admittance_step(base._core, *x, step), ("eta", eta, (k,)),
+                 ("eta_dot", eta_dot, (k,)), ("wrench", wrench, (6,)))
 
 
 def second_order_hold(stiffness: float, damping: float, dt: float) -> tuple[np.ndarray, np.ndarray]:
@@ -425,6 +470,29 @@ class Run:
         _choice("which", which, ("actual", "commanded", "measured"))
         units = ("x", "m"), ("y", "m"), ("z", "m"), ("alpha", "rad"), ("beta", "rad"), ("gamma", "rad")
         return np.column_stack([self[f"{c}_{which}_{unit}"] for c, unit in units])
+
+    def to_dataframe(self):
+        """A pandas.DataFrame, a row a tick, by t_s. Needs pandas."""
+        import pandas
+        return pandas.DataFrame(self.columns).set_index("t_s")
+
+    def plot(self, which: str = "actual"):
+        """Positions [mm] and angles [deg] over time, the commanded ones dashed. Returns the
+        matplotlib.figure.Figure."""
+        from matplotlib.figure import Figure
+        figure = Figure(figsize=(7, 5), layout="constrained")
+        t, pose, commanded = self["t_s"], self.pose(which), self.pose("commanded")
+        for axes, part, scale, names, label in zip(
+                figure.subplots(2, 1, sharex=True), (slice(0, 3), slice(3, 6)), (1e3, 180 / np.pi),
+                (("x", "y", "z"), ("alpha", "beta", "gamma")), ("position [mm]", "angle [deg]")):
+            for k, name in enumerate(names):
+                line, = axes.plot(t, scale * pose[:, part][:, k], label=name)
+                axes.plot(t, scale * commanded[:, part][:, k], "--", color=line.get_color(), linewidth=0.8)
+            axes.set_ylabel(label)
+            axes.legend(loc="upper right")
+            axes.grid(alpha=0.3)
+        axes.set_xlabel("time [s]")
+        return figure
 
     def __repr__(self) -> str:
         ended = self.phase + (f" by {self.cause}" if self.cause else "")

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The Python package `ves`: the laws its functions keep, the programs' numbers, and its refusals."""
 import argparse
+import copy
 import csv
 import inspect
 import os
 import pathlib
+import pickle
 import subprocess
 import sys
 import tempfile
@@ -255,10 +257,18 @@ class Refusals(unittest.TestCase):
         z = np.zeros(6)
         for error, says, call in (
                 (ValueError, "pose: has shape (5,), want (6,)", lambda: ves.leg_lengths(p, np.zeros(5))),
-                (ValueError, "pose: has shape (1, 6)", lambda: ves.leg_lengths(p, np.zeros((1, 6)))),
+                (ValueError, "pose: has shape (1, 1, 6)", lambda: ves.leg_lengths(p, np.zeros((1, 1, 6)))),
+                (ValueError, "pose[1][2]: nan", lambda: ves.leg_lengths(p, [z, [0, 0, np.nan, 0, 0, 0]])),
+                (ValueError, "batches of 2, 3 do not go together",
+                 lambda: ves.leg_motion(p, np.zeros((2, 6)), np.zeros((3, 6)), z)),
+                (TypeError, "is a masked array", lambda: ves.leg_lengths(p, np.ma.array(z, mask=z == 0))),
+                (TypeError, "holds complex128", lambda: ves.leg_lengths(p, z + 1j)),
+                (TypeError, "holds object", lambda: ves.leg_lengths(p, z.astype(object))),
+                (TypeError, "holds <U1", lambda: ves.leg_lengths(p, ["0"] * 6)),
+                (TypeError, "a masked array", lambda: ves.run("z_sine", {"sensor.gain": np.ma.array(z)})),
                 (ValueError, "lengths[2]: nan, want finite", lambda: ves.forward_pose(p, [1, 1, np.nan, 1, 1, 1])),
                 (ValueError, "guess[0]: inf", lambda: ves.forward_pose(p, [1.5] * 6, [np.inf, 0, 0, 0, 0, 0])),
-                (TypeError, "pose: want numbers", lambda: ves.leg_lengths(p, "home")),
+                (TypeError, "pose: holds <U4, want real numbers", lambda: ves.leg_lengths(p, "home")),
                 (TypeError, "pose: want numbers", lambda: ves.leg_lengths(p, [[1, 2], [3]])),
                 (TypeError, "platform: is of type Robot, want Platform", lambda: ves.leg_lengths(r, z)),
                 (TypeError, "robot: is of type Platform, want Robot", lambda: ves.link_poses(p, z)),
@@ -283,6 +293,58 @@ class Refusals(unittest.TestCase):
                 (KeyError, "want one of t_s", lambda: ves.Run({"t_s": z}, "", "")["t"])):
             with self.subTest(says):
                 self.refused(error, says, call)
+
+
+class Arrays(unittest.TestCase):
+    def test_a_batch_is_what_its_members_are(self):
+        p, r, b = ves.load_platform("z_sine"), ves.load_robot("puma560"), ves.load_base("table_4_1")
+        X, Q = random.uniform(-0.2, 0.2, (5, 6)), random.uniform(-1, 1, (5, 6))
+        for function, arguments in (
+                (ves.rotation, (X[:, 3:],)), (ves.fixed_angles, (ves.rotation(X[:, 3:]),)),
+                (ves.angle_rate_map, (X[:, 3:],)), (lambda x: ves.leg_lengths(p, x), (X,)),
+                (lambda x: ves.jacobian(p, x), (X,)), (lambda x: ves.condition_number(p, x), (X,)),
+                (lambda *x: ves.leg_motion(p, *x), (X, Q, Q)), (lambda *x: ves.forward_motion(p, *x), (X, Q, Q)),
+                (lambda x: ves.forward_pose(p, x), (ves.leg_lengths(p, X),)), (lambda q: ves.link_poses(r, q), (Q,)),
+                (lambda *q: ves.newton_euler(r, *q), (Q, Q, Q)), (lambda q: ves.composite_body(r, q), (Q,)),
+                (lambda q: ves.gravity_wrench(r, q), (Q,)), (lambda *e: ves.admittance_step(b, *e, 0.1), (Q, Q, X))):
+            whole = function(*arguments)
+            for k in range(5):
+                one = function(*(a[k] for a in arguments))
+                for w, o in zip(whole, one) if isinstance(whole, tuple) else ((whole, one),):
+                    np.testing.assert_array_equal(w[k], o)
+
+    def test_the_jacobian_leads_from_twists_to_leg_rates(self):
+        p = ves.load_platform("z_sine")
+        for x, rates in zip(random.uniform(-0.2, 0.2, (10, 6)), random.uniform(-1, 1, (10, 6))):
+            twist = np.concatenate([rates[:3], ves.angle_rate_map(x[3:]) @ rates[3:]])
+            legs = (ves.leg_lengths(p, x + 1e-6 * rates) - ves.leg_lengths(p, x - 1e-6 * rates)) / 2e-6
+            np.testing.assert_allclose(ves.jacobian(p, x) @ twist, legs, atol=1e-8)
+
+    def test_numbers_of_numpy_are_numbers(self):
+        p = ves.load_platform("desk")
+        x = np.float32([0, 0, 0.01, 0, 0, 0])
+        np.testing.assert_array_equal(ves.leg_lengths(p, x), ves.leg_lengths(p, x.astype(float)))
+        short = {"program": "[{move: {}}]", "sensor.noise": np.bool_(False), "seed": np.int64(3),
+                 "gravity_m_per_s2": np.array(9.5)}
+        self.assertEqual(ves.run("z_sine", short).phase, "parked")
+
+    def test_everything_can_be_pickled_and_copied(self):
+        p, r, b = ves.load_platform("desk"), ves.load_robot("puma560"), ves.load_base("table_4_1")
+        run = ves.run("z_sine", {"program": "[{move: {}}]"})
+        q = random.uniform(-1, 1, (3, 6))
+        for again in (lambda x: pickle.loads(pickle.dumps(x)), copy.copy, copy.deepcopy):
+            np.testing.assert_array_equal(ves.leg_lengths(again(p), 1e-3 * q), ves.leg_lengths(p, 1e-3 * q))
+            for ours, theirs in zip(ves.newton_euler(again(r), q, q, q), ves.newton_euler(r, q, q, q)):
+                np.testing.assert_array_equal(ours, theirs)
+            np.testing.assert_array_equal(again(b).damping, b.damping)
+            np.testing.assert_array_equal(again(run).pose(), run.pose())
+        self.assertEqual(len(run.plot().axes), 2)
+
+    def test_another_numpy_is_refused_before_it_ends_the_process(self):
+        done = subprocess.run([sys.executable, "-c", "import numpy; numpy.__version__ = '2.1.0'; import ves"],
+                              text=True, capture_output=True, check=False)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("ImportError: ves was built for NumPy 1, this is NumPy 2.1.0", done.stderr)
 
 
 class Help(unittest.TestCase):
