@@ -48,8 +48,15 @@ inline int allCores() {
   return static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
 }
 
+/// LCM's own variable, where it is set; else `otherwise`.
+inline std::string defaultUrl(const char* otherwise = kDefaultUrl) {
+  const char* given = std::getenv("LCM_DEFAULT_URL");
+  return given && *given ? given : otherwise;
+}
+
 inline void addUrl(CLI::App& cli, std::string& url,
                    const char* what = "LCM bus; &key=FILE: a key that signs its messages") {
+  url = defaultUrl(url.c_str());
   cli.add_option("--url", url, what)->capture_default_str();
 }
 
@@ -95,6 +102,15 @@ inline std::filesystem::path configFolder() {
   return here || !std::filesystem::exists(installed, error) ? "config" : installed;
 }
 
+/// For logs of lcm-logger that began after the configuration was announced.
+inline void addScenarioOfLog(CLI::App& cli, std::string& scenario) {
+  cli.add_option("--scenario", scenario, "of a log without a configuration");
+}
+inline std::optional<Experiment> scenarioOfLog(const std::string& scenario) {
+  if (scenario.empty()) return {};
+  return loadExperiment(findScenario(scenario, configFolder()));
+}
+
 /// Which experiment, and on which bus.
 struct Options {
   std::string scenario;
@@ -119,11 +135,14 @@ struct Options {
                    "file that a servo identification has left, for the controller");
     cli.add_flag("--verbose", verbose, "also what is known to be odd in the robot's file");
   }
+  const CLI::Option* url = nullptr;
+
   void addForce(CLI::App& cli) {
     cli.add_flag("--force", force, "admittance control even where it would diverge");
   }
   void addBus(CLI::App& cli) {
     addUrl(cli, process.url);
+    url = cli.get_option("--url");
     cli.add_flag("--lockstep", process.lockstep, "as fast as possible, nothing waits on a clock");
     cli.add_flag("--realtime", process.realtime, "insist on SCHED_FIFO and locked memory");
     auto* alone = cli.add_flag("--private-bus", private_bus, "on a network of this run's own");
@@ -134,6 +153,9 @@ struct Options {
   void enterBus() const {
     if (private_bus) enterPrivateBus();
     joinIfNamed(join);
+    const bool own = private_bus || !join.empty() || process.lockstep || url->count() > 0;
+    if (!own && process.url == defaultUrl(""))
+      fmt::print(stderr, "bus: {} (LCM_DEFAULT_URL)\n", process.url);
   }
 
   /// The bus's key is the scenario's, unless --url names one.

@@ -8,16 +8,19 @@
 #include "app.hpp"
 #include "commands.hpp"
 #include "ves/bus/channels.hpp"
-#include "ves/series/series.hpp"
-#include "ves/run/follow_bus.hpp"
+#include "ves/bus/ordered_log.hpp"
+#include "ves/core/build.hpp"
 #include "ves/export/ros2.hpp"
+#include "ves/run/follow_bus.hpp"
+#include "ves/series/series.hpp"
 
 namespace ves::app {
 
 namespace {
 
 /// A whole log, or the run on the bus as it happens.
-int writeMcap(const std::string& log, const std::string& url, const std::string& file) {
+int writeMcap(const std::string& log, const std::string& url, const std::string& file,
+              const std::optional<Experiment>& without) {
   std::optional<McapExport> out;
   const auto begin = [&](const experiment_t& m) {
     out.emplace(parseExperiment(m.resolved, channel::kExperiment), m.version, file);
@@ -31,14 +34,16 @@ int writeMcap(const std::string& log, const std::string& url, const std::string&
       throw InputError(fmt::format("bus {}: no run, nothing is written", url));
   } else {
     Damage damage;
-    LogReader reader(log, &damage);
+    OrderedLog reader(log, &damage);
     LogEvent event;
+    if (without) out.emplace(*without, describeBuild(), file);
     while (reader.next(event)) {
       if (event.channel == channel::kExperiment && !out) begin(event.require<experiment_t>(log));
       if (out) out->add(event);
     }
     printDamage(damage);
-    if (!out) throw InputError(fmt::format("{}: no configuration in this log", log));
+    if (!out)
+      throw InputError(fmt::format("{}: no configuration in this log; --scenario names one", log));
   }
   out->finish();
   return kDone;
@@ -49,7 +54,7 @@ int writeMcap(const std::string& log, const std::string& url, const std::string&
 int collectCommand(int argc, char** argv) {
   CLI::App cli("Takes variables out of a log, as CSV with the unit in every column's name.",
                "ves collect");
-  std::string log, out, mcap, url = kDefaultUrl, join;
+  std::string log, out, mcap, scenario, url = kDefaultUrl, join;
   bool follow = false;
   std::vector<std::string> select;
   bool list = false;
@@ -65,14 +70,16 @@ int collectCommand(int argc, char** argv) {
   cli.add_option("--out", out, "file; standard output by default");
   cli.add_option("--mcap", mcap, "everything into this MCAP file for Foxglove, PlotJuggler, Rerun");
   cli.add_flag("--follow", follow, "the run on the bus instead of a log, with --mcap");
+  addScenarioOfLog(cli, scenario);
   addUrl(cli, url, "LCM bus, with --follow");
   addJoin(cli, join);
   return run(cli, argc, argv, [&] {
     if (follow == !log.empty() || (follow && mcap.empty()))
       throw InputError("want a log, or --follow with --mcap FILE");
     joinIfNamed(join);
-    if (!mcap.empty()) return writeMcap(log, url, mcap);
-    const Series series = readSeries(log);
+    const std::optional<Experiment> without = scenarioOfLog(scenario);
+    if (!mcap.empty()) return writeMcap(log, url, mcap, without);
+    const Series series = readSeries(log, without ? &*without : nullptr);
     printDamage(series.damage);
     std::vector<Column> chosen;
     std::vector<bool> used(select.size(), false);

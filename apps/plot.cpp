@@ -29,7 +29,7 @@ std::string unitOf(const std::string& name) {
 int plotCommand(int argc, char** argv) {
   CLI::App cli("Columns of a recorded run as a picture, those of one unit in one panel.",
                "ves plot");
-  std::string log, out = "plot.svg";
+  std::string log, scenario, out = "plot.svg";
   std::vector<std::string> select;
   double from = 0.0, duration = HUGE_VAL;
   cli.add_option("log", log, "LCM event log of a run")->required();
@@ -38,9 +38,11 @@ int plotCommand(int argc, char** argv) {
   cli.add_option("--from", from, "[s] since the first tick")->check(inRange(0.0, 1e9));
   cli.add_option("--duration", duration, "[s]; to the end by default")->check(inRange(0.0, 1e9));
   cli.add_option("--out", out, "SVG file")->capture_default_str();
+  addScenarioOfLog(cli, scenario);
   return run(cli, argc, argv, [&] {
     constexpr std::size_t kMostPanels = 8;
-    const Series series = readSeries(log);
+    const std::optional<Experiment> without = scenarioOfLog(scenario);
+    const Series series = readSeries(log, without ? &*without : nullptr);
     printDamage(series.damage);
     std::vector<bool> used(select.size(), false);
     std::vector<std::pair<std::string, Panel>> panels;  // by unit

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // Logs: what is written comes back; what is damaged is named, and the rest is used.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -202,9 +203,14 @@ class SeriesOf : public Log {
  protected:
   void SetUp() override {
     Log::SetUp();
+    record(0.01);
+  }
+  void record(double amplitude) {
     LogWriter writer(file_.string());
-    runLockstep(test::experiment("z_sine", {"program=[{trajectory: {duration_s: 0.5, z: {sine: "
-                                            "{amplitude_m: 0.01, frequency_hz: 1}}}}]"}),
+    runLockstep(test::experiment(
+                    "z_sine", {fmt::format("program=[{{trajectory: {{duration_s: 0.5, z: {{sine: "
+                                           "{{amplitude_m: {}, frequency_hz: 1}}}}}}}}]",
+                                           amplitude)}),
                 &writer, nullptr);
   }
   /// Ticks, and what is wrong.
@@ -226,11 +232,12 @@ TEST_F(SeriesOf, ACutLogIsItsBeginning) {
 }
 
 TEST_F(SeriesOf, TwoLogsPutTogetherAreTheFirst) {  // in lockstep both controllers have one name
-  const std::vector<char> good = bytes();
+  std::vector<char> both = bytes();
   const std::size_t all = rows().first;
-  std::vector<char> twice = good;
-  twice.insert(twice.end(), good.begin(), good.end());
-  put(twice);
+  record(0.02);
+  const std::vector<char> second = bytes();
+  both.insert(both.end(), second.begin(), second.end());
+  put(both);
   const auto [ticks, why] = rows();
   EXPECT_EQ(ticks, all);
   EXPECT_NE(why.find("another controller's run begins here"), std::string::npos) << why;

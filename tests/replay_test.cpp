@@ -2,13 +2,16 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <random>
 
 #include "support/refusal.hpp"
 #include "support/rig.hpp"
 #include "ves/bus/channels.hpp"
 #include "ves/run/replay.hpp"
 #include "ves/run/run.hpp"
+#include "ves/series/series.hpp"
 
 namespace ves {
 namespace {
@@ -56,6 +59,45 @@ TEST_F(Replay, RepeatsEveryStateAndCommand) {
   EXPECT_EQ(r.messages, 2 * r.ticks);
   EXPECT_EQ(r.different, 0);
   EXPECT_EQ(r.phase, Phase::kParked);
+}
+
+// Two loggers' files put together, a network that delays: repeats and order are told by sequences.
+TEST_F(Replay, RepeatsALogWhoseEventsCameTwiceOrLate) {
+  std::vector<LogEvent> events;
+  copy([&](LogEvent& event) {
+    events.push_back(event);
+    return false;
+  });
+  std::vector<std::pair<double, LogEvent>> late;
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> delay(0.0, 8.0);  // [-] events
+  for (std::size_t i = 0; i < events.size(); ++i)
+    for (int copies = 0; copies < 2; ++copies)
+      late.emplace_back(static_cast<double>(i) + (i > 10 ? delay(random) : 0.0), events[i]);
+  std::stable_sort(late.begin(), late.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  {
+    LogWriter writer(edited_);
+    for (const auto& [when, event] : late)
+      writer.write(event.channel, event.data.data(), static_cast<std::int64_t>(event.data.size()),
+                   event.time_us * 1000);
+  }
+  const ReplayResult whole = replay(log_, {}, nullptr), r = replay(edited_, {}, nullptr);
+  EXPECT_EQ(r.ticks, whole.ticks);
+  EXPECT_EQ(r.messages, whole.messages);
+  EXPECT_EQ(r.different, 0);
+  const Series straight = readSeries(log_), put_right = readSeries(edited_);
+  ASSERT_EQ(put_right.rows.size(), straight.rows.size());
+  const std::vector<Column> all = columns(straight.experiment);
+  for (std::size_t i = 0; i < straight.rows.size(); ++i)
+    ASSERT_EQ(csvRow(all, put_right.rows[i]), csvRow(all, straight.rows[i])) << i;
+}
+
+TEST_F(Replay, ALogWithoutAConfigurationIsReadWithOne) {
+  copy([](const LogEvent& event) { return event.channel != channel::kExperiment; });
+  EXPECT_NE(test::refusal([&] { readSeries(edited_); }).find("--scenario"), std::string::npos);
+  const Experiment e = experiment("puma_on_table_4_1");
+  EXPECT_EQ(readSeries(edited_, &e).rows.size(), readSeries(log_).rows.size());
 }
 
 TEST_F(Replay, RepeatsARunWithEverythingBeyondTheReport) {  // with times that are not the tick's

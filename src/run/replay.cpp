@@ -10,6 +10,7 @@
 #include "ves/bus/bus.hpp"
 #include "ves/bus/channels.hpp"
 #include "ves/bus/fields.hpp"
+#include "ves/bus/ordered_log.hpp"
 #include "ves/core/build.hpp"
 #include "ves/realtime/realtime.hpp"
 
@@ -60,7 +61,7 @@ class Replayer {
       : log_(log), options_(options), watch_(watch) {}
 
   ReplayResult run() {
-    LogReader reader(log_);
+    OrderedLog reader(log_);
     while (reader.next(event_)) {
       if (event_.channel == channel::kExperiment)
         configure();

@@ -13,6 +13,7 @@
 
 #include "ves/bus/channels.hpp"
 #include "ves/bus/fields.hpp"
+#include "ves/bus/ordered_log.hpp"
 #include "ves/core/coordinates.hpp"
 
 namespace ves {
@@ -49,11 +50,11 @@ std::optional<Row> RowMaker::add(const state_t& state) {
   return std::exchange(row_, row);
 }
 
-Series readSeries(const std::string& log) {
+Series readSeries(const std::string& log, const Experiment* without) {
   Series series;
   bool configured = false;
   RowMaker rows;
-  LogReader reader(log, &series.damage);
+  OrderedLog reader(log, &series.damage);
   LogEvent event;
   std::optional<Identity> controller;
   std::int64_t tick = -1;
@@ -95,14 +96,20 @@ Series readSeries(const std::string& log) {
     }
   }
   if (const auto row = rows.finish()) series.rows.push_back(*row);
-  if (twice > 0)
-    series.damage.add(
-        fmt::format("{}: {} ticks stand there twice; each is taken once", log, twice));
+  if (!configured && without) {
+    series.experiment = *without;
+    configured = true;
+  }
+  if (twice > 0 || reader.repeated() > 0)
+    series.damage.add(fmt::format("{}: {} events stand there twice; each is taken once", log,
+                                  twice + reader.repeated()));
   if (series.damage.any() && (!configured || series.rows.empty()))
     throw InputError(series.damage.first());
   if (!configured)
     throw InputError(
-        fmt::format("{}: no configuration in this log (channel {})", log, channel::kExperiment));
+        fmt::format("{}: no configuration in this log (channel {}); --scenario names one where "
+                    "a command has it",
+                    log, channel::kExperiment));
   return series;
 }
 

@@ -57,7 +57,7 @@ class RowMaker {
 
 /// The first controller's run in a log. Damage is passed over and told. Throws InputError when the
 /// file is no log, or a log without its configuration or a tick.
-Series readSeries(const std::string& log);
+Series readSeries(const std::string& log, const Experiment* without = nullptr);
 
 /// A run in lockstep as rows, without a log between: the same rows.
 struct RecordedRun {
