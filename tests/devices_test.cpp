@@ -4,10 +4,16 @@
 #include "ves/devices/machine.hpp"
 #include "ves/run/announcer.hpp"
 
+#include <arpa/inet.h>
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <pty.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <Eigen/QR>
+#include <fstream>
 #include <random>
 
 #include "support/programs.hpp"
@@ -15,6 +21,7 @@
 #include "support/refusal.hpp"
 #include "support/rig.hpp"
 #include "ves/bus/channels.hpp"
+#include "ves/devices/force_stream.hpp"
 #include "ves/devices/net_ft.hpp"
 #include "ves/devices/net_ft_server.hpp"
 #include "ves/devices/on_bus.hpp"
@@ -317,6 +324,170 @@ TEST(Rdt, AToolTransformIsTakenOutAndAFilterIsRefused) {
     const std::string said = test::refusal([&, t = text] { netFtCalibration(t); });
     EXPECT_NE(said.find(says), std::string::npos) << said;
   }
+}
+
+// --- Streams that a scenario describes -----------------------------------------------------------
+
+StreamSource streamOf(const std::vector<std::string>& set) {
+  std::vector<std::string> all = {"machine.force_sensor=stream"};
+  for (const std::string& one : set) all.push_back("machine.stream." + one);
+  return std::get<StreamSource>(test::experiment("z_sine", all).machine.force_sensor);
+}
+
+/// Bit by bit, most significant first on reflected data: another way than the driver's.
+std::uint16_t crcByBits(const std::vector<std::uint8_t>& data, std::uint16_t poly,
+                        std::uint16_t out) {
+  std::uint16_t crc = 0xffff;
+  for (const std::uint8_t byte : data)
+    for (int bit = 0; bit < 8; ++bit) {
+      const bool carry = (crc & 0x8000) != 0;
+      crc = static_cast<std::uint16_t>(crc << 1);
+      if (carry != ((byte >> bit & 1) != 0)) crc ^= poly;
+    }
+  std::uint16_t reflected = 0;
+  for (int bit = 0; bit < 16; ++bit)
+    if (crc >> bit & 1) reflected = static_cast<std::uint16_t>(reflected | 0x8000 >> bit);
+  return reflected ^ out;
+}
+
+/// Robotiq's FT 300: 20 4e, six int16 in 1/100 N and 1/1000 N m, a Modbus sum.
+std::vector<std::uint8_t> robotiq(const std::array<int, 6>& values) {
+  std::vector<std::uint8_t> out = {0x20, 0x4e};
+  for (const int v : values)
+    for (int shift : {0, 8}) out.push_back(static_cast<std::uint8_t>(v >> shift));
+  const std::uint16_t crc = crcByBits(out, 0x8005, 0);
+  out.push_back(static_cast<std::uint8_t>(crc));
+  out.push_back(static_cast<std::uint8_t>(crc >> 8));
+  return out;
+}
+
+/// Bota's serial frames: aa, a status, six floats, a time, a temperature, and an X.25 sum of these.
+std::vector<std::uint8_t> bota(const std::array<float, 6>& values) {
+  std::vector<std::uint8_t> data = {0, 0};
+  const auto put = [&](const void* from) {
+    const auto* bytes = static_cast<const std::uint8_t*>(from);
+    data.insert(data.end(), bytes, bytes + 4);
+  };
+  for (const float v : values) put(&v);
+  const std::uint32_t time = 1234;
+  const float temperature = 25.0f;
+  put(&time);
+  put(&temperature);
+  const std::uint16_t crc = crcByBits(data, 0x1021, 0xffff);
+  data.insert(data.begin(), 0xaa);
+  data.push_back(static_cast<std::uint8_t>(crc));
+  data.push_back(static_cast<std::uint8_t>(crc >> 8));
+  return data;
+}
+const std::vector<std::string> kBota = {"values=float32",     "sync=[170]",
+                                        "length=37",          "first=3",
+                                        "checksum=crc16_x25", "checksum_over=[1, 35]",
+                                        "checksum_at=35",     "scale=[1, 1, 1, 1, 1, 1]"};
+
+/// Every wrench of bytes that come in pieces of `piece`.
+std::vector<Vec6> parsed(StreamParser& parser, const std::vector<std::uint8_t>& bytes,
+                         std::size_t piece) {
+  std::vector<Vec6> out;
+  for (std::size_t at = 0; at < bytes.size(); at += piece)
+    parser.take(bytes.data() + at, std::min(piece, bytes.size() - at),
+                [&](const Vec6& wrench) { out.push_back(wrench); });
+  return out;
+}
+
+TEST(StreamParser, FindsFramesInPiecesOfAnySizeAndAfterNoise) {
+  for (const bool is_bota : {false, true})
+    for (const std::size_t piece : {1u, 5u, 16u, 100u, 4000u}) {
+      StreamParser parser(streamOf(is_bota ? kBota : std::vector<std::string>{}));
+      std::vector<std::uint8_t> bytes = {0x20, 0x4e, 0xaa, 7, 0x20};  // the end of one that was cut
+      for (int k = 0; k < 20; ++k) {
+        std::vector<std::uint8_t> frame =
+            is_bota ? bota({1.5f * float(k), -2.0f, 3.0f, 0.25f, -0.5f, 0.125f})
+                    : robotiq({150 * k, -200, 300, 250, -500, 125});
+        if (k == 7) frame[5] ^= 0x40;  // damaged on the way
+        bytes.insert(bytes.end(), frame.begin(), frame.end());
+      }
+      const std::vector<Vec6> wrenches = parsed(parser, bytes, piece);
+      ASSERT_EQ(wrenches.size(), 19u) << piece;
+      EXPECT_GE(parser.malformed(), 1);
+      Vec6 want;
+      want << 1.5 * 19, -2.0, 3.0, 0.25, -0.5, 0.125;
+      EXPECT_LT((wrenches.back() - want).norm(), 1e-12) << wrenches.back().transpose();
+    }
+}
+
+TEST(StreamParser, ReadsLinesWithAnyChannelsAndSigns) {
+  StreamParser parser(streamOf({"values=text", "first=1", "separators=;", "checksum=none",
+                                "channels=[fz, fx, fy, mz, mx, my]", "scale=[-1, 1, 1, 2, 1, 1]"}));
+  const std::string text = "17; 1.5;+2;3e0;4;5;-6;99\r\nno numbers\n18;1;2;3\n19 1 2 3 4 5 nan\n";
+  const std::vector<Vec6> got = parsed(parser, {text.begin(), text.end()}, 7);
+  ASSERT_EQ(got.size(), 1u);
+  Vec6 want;
+  want << 2, 3, -1.5, 5, -6, 8;
+  EXPECT_EQ(got[0], want);
+  EXPECT_EQ(parser.malformed(), 3);
+}
+
+TEST(StreamParser, WhatCannotBeAFrameIsRefused) {
+  for (const auto& [set, says] :
+       {std::pair{"length=8", "stream.length: 8 bytes, want 14 at least"},
+        {"source=usb", "stream.source: 'usb', want serial:DEVICE, udp:PORT or pipe:FILE"},
+        {"source=udp:99999", "stream.source"},
+        {"channels=[fx, fx, fz, mx, my, mz]", "'fx', want each of fx, fy"},
+        {"checksum_over=[4, 4]", "stream.checksum_over"},
+        {"scale=[1,1,1,1,1,0]", "stream.scale: has a 0"}}) {
+    const std::string said = test::refusal([&, s = set] { streamOf({s}); });
+    EXPECT_NE(said.find(says), std::string::npos) << said;
+  }
+}
+
+TEST(ForceStream, IsReadFromASerialLineUdpAndAPipe) {
+  const Mat6 S_proc = 100.0 * Mat6::Identity();
+  const auto reads = [&](const StreamSource& source, const std::function<void()>& send) {
+    ForceStream sensor(source, S_proc, 0);
+    WrenchReading w;
+    EXPECT_FALSE(sensor.read(w));
+    send();
+    const std::int64_t until = monotonicNow() + 10'000'000'000;
+    while (!sensor.read(w) && monotonicNow() < until) usleep(500);
+    EXPECT_EQ(w.counts[0], 150);
+    EXPECT_EQ(w.counts[4], -50);
+    EXPECT_FALSE(w.fault);
+  };
+  const auto frame = robotiq({150, -200, 300, 250, -500, 125});
+  int master = -1, slave = -1;
+  char name[64];
+  ASSERT_EQ(openpty(&master, &slave, name, nullptr, nullptr), 0);
+  reads(streamOf({std::string("source=serial:") + name}),
+        [&] { ASSERT_EQ(::write(master, frame.data(), frame.size()), std::ssize(frame)); });
+  close(master);
+  close(slave);
+
+  const int out = socket(AF_INET, SOCK_DGRAM, 0);
+  sockaddr_in to{};
+  to.sin_family = AF_INET;
+  to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof to;
+  ASSERT_EQ(bind(out, reinterpret_cast<sockaddr*>(&to), sizeof to), 0);  // a port that is free
+  getsockname(out, reinterpret_cast<sockaddr*>(&to), &size);
+  close(out);
+  std::vector<std::string> set = kBota;
+  set.push_back(fmt::format("source=udp:{}", ntohs(to.sin_port)));
+  reads(streamOf(set), [&] {
+    const auto f = bota({1.5f, -2.0f, 3.0f, 0.25f, -0.5f, 0.125f});
+    const int from = socket(AF_INET, SOCK_DGRAM, 0);
+    sendto(from, f.data(), f.size(), 0, reinterpret_cast<sockaddr*>(&to), sizeof to);
+    close(from);
+  });
+
+  const std::string pipe = "/tmp/ves_pipe_" + std::to_string(getpid());
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  reads(streamOf({"source=pipe:" + pipe, "values=text", "first=0", "scale=[1, 1, 1, 1, 1, 1]"}),
+        [&] { std::ofstream(pipe) << "1.5, -2, 3, 0.25, -0.5, 0.125\n"; });
+  unlink(pipe.c_str());
+  EXPECT_NE(test::refusal([&] {
+              ForceStream(streamOf({"source=serial:/dev/null"}), S_proc, 0);
+            }).find("force sensor /dev/null: is no serial line"),
+            std::string::npos);
 }
 
 // --- The driver against a sensor written apart from it -------------------------------------------

@@ -3,6 +3,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <charconv>
+
 #include "ves/math/dense.hpp"
 
 namespace ves {
@@ -101,6 +104,85 @@ ForceSensorSource readNetFt(Section& machine) {
   return out;
 }
 
+/// "serial:/dev/ttyUSB0", "udp:5000" or "pipe:FILE".
+void readFrom(Section& s, StreamSource& out) {
+  const std::string from = s.text("source");
+  const std::size_t colon = from.find(':');
+  const std::string how = from.substr(0, colon),
+                    what = colon == std::string::npos ? "" : from.substr(colon + 1);
+  using From = StreamSource::From;
+  for (const auto& [name, kind] :
+       {std::pair{"serial", From::kSerial}, {"udp", From::kUdp}, {"pipe", From::kPipe}})
+    if (how == name && !what.empty()) {
+      out.from = kind;
+      out.path = what;
+      if (kind != From::kUdp) return;
+      const auto [end, error] = std::from_chars(what.data(), what.data() + what.size(), out.port);
+      if (error == std::errc() && end == what.data() + what.size() && out.port > 0 &&
+          out.port < 65536)
+        return;
+    }
+  s.fail("source", fmt::format("'{}', want serial:DEVICE, udp:PORT or pipe:FILE", from));
+}
+
+ForceSensorSource readStream(Section& machine) {
+  constexpr int kLongest = 256;  // [B] of a frame
+  Section s = machine.section("stream");
+  StreamSource out;
+  readFrom(s, out);
+  out.baud = static_cast<int>(s.integer("baud", 50, 4'000'000));
+  using Value = StreamSource::Value;
+  const std::string value = s.choice("values", {"text", "int16", "int32", "float32"});
+  out.value = value == "text"    ? Value::kText
+              : value == "int16" ? Value::kInt16
+              : value == "int32" ? Value::kInt32
+                                 : Value::kFloat32;
+  out.separators = s.text("separators");
+  out.first = static_cast<int>(s.integer("first", 0, kLongest));
+  out.big_endian = s.choice("byte_order", {"little", "big"}) == "big";
+  for (const double byte : s.vector("sync", -1, 0.0, 255.0))
+    out.sync.push_back(static_cast<std::uint8_t>(byte));
+  out.length = static_cast<int>(s.integer("length", 1, kLongest));
+  using Checksum = StreamSource::Checksum;
+  const std::string kind =
+      s.choice("checksum", {"none", "sum8", "xor8", "crc16_modbus", "crc16_x25", "crc32"});
+  for (const auto& [name, one] : {std::pair{"none", Checksum::kNone},
+                                  {"sum8", Checksum::kSum8},
+                                  {"xor8", Checksum::kXor8},
+                                  {"crc16_modbus", Checksum::kCrc16Modbus},
+                                  {"crc16_x25", Checksum::kCrc16X25},
+                                  {"crc32", Checksum::kCrc32}})
+    if (kind == name) out.checksum = one;
+  const Eigen::VectorXd over = s.vector("checksum_over", 2, 0.0, kLongest);
+  out.checksum_from = static_cast<int>(over(0));
+  out.checksum_to = static_cast<int>(over(1));
+  out.checksum_at = static_cast<int>(s.integer("checksum_at", 0, kLongest));
+  const std::vector<std::string> channels = s.texts("channels");
+  if (channels.size() != 6) s.fail("channels", "want six of fx, fy, fz, mx, my, mz, each once");
+  for (std::size_t i = 0; i < 6; ++i) {
+    int at = -1;
+    for (int k = 0; k < 6; ++k)
+      if (wrenchComponent(k).name == channels[i]) at = k;
+    if (at < 0 || std::count(channels.begin(), channels.end(), channels[i]) > 1)
+      s.fail("channels",
+             fmt::format("'{}', want each of fx, fy, fz, mx, my, mz once", channels[i]));
+    out.channels[i] = at;
+  }
+  out.scale = s.vector("scale", 6, -1e6, 1e6);
+  if ((out.scale.array() == 0.0).any()) s.fail("scale", "has a 0");
+  const int size = value == "int16" ? 2 : 4;
+  if (out.value != Value::kText &&
+      (out.first + 6 * size > out.length || static_cast<int>(out.sync.size()) > out.length))
+    s.fail("length", fmt::format("{} bytes, want {} at least for six values from byte {} on",
+                                 out.length, out.first + 6 * size, out.first));
+  if (out.checksum != Checksum::kNone &&
+      (out.checksum_from >= out.checksum_to || out.checksum_to > out.length ||
+       out.checksum_at >= out.length))
+    s.fail("checksum_over", "want the first byte and the one behind the last, inside the frame");
+  s.finish();
+  return out;
+}
+
 /// What `force_sensor` may say, and who reads the section that goes with it.
 struct ForceSensorKind {
   std::string_view name;
@@ -110,17 +192,19 @@ constexpr ForceSensorKind kForceSensors[] = {
     {"simulated", [](Section&) -> ForceSensorSource { return Simulated{}; }},
     {"external", [](Section&) -> ForceSensorSource { return External{}; }},
     {"net_ft", readNetFt},
+    {"stream", readStream},
 };
 static_assert(std::size(kForceSensors) == std::variant_size_v<ForceSensorSource>,
               "each kind of force sensor has a line in kForceSensors");
 
-/// The sections of those that are not chosen are looked at too.
+/// The sections of those that are not chosen are looked at too, where they are given.
 ForceSensorSource readForceSensor(Section& machine) {
   std::vector<std::string_view> names;
   for (const ForceSensorKind& kind : kForceSensors) names.push_back(kind.name);
   const std::string chosen = machine.choice("force_sensor", names);
   ForceSensorSource out;
   for (const ForceSensorKind& kind : kForceSensors) {
+    if (kind.name != chosen && !machine.has(kind.name)) continue;
     const ForceSensorSource one = kind.read(machine);
     if (kind.name == chosen) out = one;
   }

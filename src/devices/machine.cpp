@@ -2,6 +2,7 @@
 #include "ves/devices/machine.hpp"
 
 #include "ves/bus/channels.hpp"
+#include "ves/devices/force_stream.hpp"
 #include "ves/devices/net_ft.hpp"
 #include "ves/devices/on_bus.hpp"
 
@@ -20,6 +21,10 @@ struct ForceSensorOf {
   std::unique_ptr<ForceSensor> operator()(const NetFtAddress& address) const {
     const plant::PlantConfig& p = experiment.plant;
     return std::make_unique<NetFt>(address, p.sensor.S_proc(), p.sensor_window);
+  }
+  std::unique_ptr<ForceSensor> operator()(const StreamSource& source) const {
+    const plant::PlantConfig& p = experiment.plant;
+    return std::make_unique<ForceStream>(source, p.sensor.S_proc(), p.sensor_window);
   }
 };
 

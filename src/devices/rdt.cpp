@@ -182,25 +182,28 @@ std::string netFtXml(const NetFtCalibration& calibration, int records_per_second
       records_per_second);
 }
 
-RdtStream::RdtStream(const NetFtCalibration& c, const Mat6& S_proc, std::int64_t window)
-    : window_(window), taken_(8192) {
+static Mat6 countsPerCount(const NetFtCalibration& c, const Mat6& S_proc) {
   Vec6 per_count;
   per_count << Vec3::Constant(1.0 / c.counts_per_newton),
       Vec3::Constant(1.0 / c.counts_per_newton_metre);
   Mat6 to_S;  // of a wrench about To in {T}
   for (int i = 0; i < 6; ++i)
     to_S.col(i) = transfer(c.X_ST, Wrench::from(Vec6(Vec6::Unit(i)))).stacked();
-  counts_per_count_ = S_proc * to_S * per_count.asDiagonal();
+  return S_proc * to_S * per_count.asDiagonal();
 }
 
+RdtStream::RdtStream(const NetFtCalibration& c, const Mat6& S_proc, std::int64_t window)
+    : window_(countsPerCount(c, S_proc), window) {}
+
 void RdtStream::take(const std::uint8_t* data, std::size_t size, std::int64_t time) noexcept {
+  constexpr std::uint32_t kSummary = 0x80000000, kThreshold = 0x00010000;  // a latch, no error
   const auto record = rdtRecord(data, size);
   if (!record) {
     ++counters_.malformed;
     return;
   }
   if (known_) {
-    const auto ahead = static_cast<std::int32_t>(record->sequence - newest().record.sequence);
+    const auto ahead = static_cast<std::int32_t>(record->sequence - sequence_);
     if (ahead <= 0) {
       ++(ahead == 0 ? counters_.repeated : counters_.late);
       return;
@@ -208,30 +211,13 @@ void RdtStream::take(const std::uint8_t* data, std::size_t size, std::int64_t ti
     counters_.lost += ahead - 1;
   }
   known_ = true;
-  taken_[count_++ % taken_.size()] = {*record, time};
+  sequence_ = record->sequence;
   ++counters_.records;
-}
-
-bool RdtStream::read(WrenchReading& out) const noexcept {
-  if (count_ == 0) return false;
-  constexpr std::uint32_t kSummary = 0x80000000, kThreshold = 0x00010000;  // a latch, no error
-  Vec6 sum = Vec6::Zero();
-  std::size_t n = 0;
-  out.time = newest().time;
-  out.fault = false;
-  for (; n < std::min(count_, taken_.size()); ++n) {
-    const Taken& one = newest(n);
-    if (n > 0 && one.time <= out.time - window_) break;
-    for (int i = 0; i < kWrenchChannels; ++i)
-      sum(i) += one.record.counts[static_cast<std::size_t>(i)];
-    out.fault = out.fault || (one.record.status != 0 && one.record.status != kThreshold &&
-                              one.record.status != (kSummary | kThreshold));
-  }
-  const Vec6 converter = counts_per_count_ * (sum / static_cast<double>(n));
-  for (int i = 0; i < kWrenchChannels; ++i)
-    out.counts[static_cast<std::size_t>(i)] =
-        static_cast<std::int32_t>(std::lround(std::clamp(converter(i), -32768.0, 32767.0)));
-  return true;
+  const bool fault = record->status != 0 && record->status != kThreshold &&
+                     record->status != (kSummary | kThreshold);
+  Vec6 counts;
+  for (int i = 0; i < kWrenchChannels; ++i) counts(i) = record->counts[static_cast<std::size_t>(i)];
+  window_.take(counts, fault, time);
 }
 
 }  // namespace ves::devices

@@ -4,6 +4,7 @@
 // text both came from.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -32,9 +33,32 @@ struct NetFtAddress {
   int http_port = 0;  // [-] of its configuration
 };
 
+/// A force sensor that sends frames or lines by itself, described in a scenario.
+struct StreamSource {
+  enum class From { kSerial, kUdp, kPipe };
+  enum class Value { kText, kInt16, kInt32, kFloat32 };  // text: numbers in lines
+  enum class Checksum { kNone, kSum8, kXor8, kCrc16Modbus, kCrc16X25, kCrc32 };
+
+  From from = From::kSerial;
+  std::string path;  // of the device or pipe
+  int port = 0;      // [-] UDP
+  int baud = 0;      // [bit/s] of a serial line
+  Value value = Value::kText;
+  std::string separators;  // of text, beside blanks
+  int first = 0;           // [-] of a line's numbers; [B] in a frame
+  bool big_endian = false;
+  std::vector<std::uint8_t> sync;  // that a frame begins with
+  int length = 0;                  // [B] of a frame
+  Checksum checksum = Checksum::kNone;
+  int checksum_from = 0, checksum_to = 0,
+      checksum_at = 0;            // [B] in a frame; `to` is behind the last
+  std::array<int, 6> channels{};  // the component of {S} that each of the six values is
+  Vec6 scale = Vec6::Ones();      // [N | N m] of one unit of each value
+};
+
 /// A driver of force sensors has its own kind; config/machine.cpp reads it, devices/machine.cpp
 /// makes it.
-using ForceSensorSource = std::variant<Simulated, External, NetFtAddress>;
+using ForceSensorSource = std::variant<Simulated, External, NetFtAddress, StreamSource>;
 
 /// Which pieces of the machine are real, and how they are reached. The simulated ones are the
 /// plant's.

@@ -9,9 +9,8 @@
 #include <cstdint>
 #include <optional>
 #include <string>
-#include <vector>
 
-#include "ves/devices/devices.hpp"
+#include "ves/devices/wrench_window.hpp"
 
 namespace ves::devices {
 
@@ -71,22 +70,13 @@ class RdtStream {
   void restart() noexcept { known_ = false; }
   /// False before the first record. A status with any bit set, of any record of the window, is a
   /// fault, but for the latch of a threshold (bit 16), which is none.
-  bool read(WrenchReading& out) const noexcept;
+  bool read(WrenchReading& out) const noexcept { return window_.read(out); }
   const Counters& counters() const noexcept { return counters_; }
 
  private:
-  Mat6 counts_per_count_;  // of the converter, of the sensor
-  std::int64_t window_;    // [ns]
+  WrenchWindow window_;
   bool known_ = false;
-  struct Taken {
-    RdtRecord record;
-    std::int64_t time = 0;  // [ns]
-  };
-  std::vector<Taken> taken_;  // a ring: more than a second of 7000
-  std::size_t count_ = 0;     // [-] so far
-  const Taken& newest(std::size_t back = 0) const noexcept {
-    return taken_[(count_ - 1 - back) % taken_.size()];
-  }
+  std::uint32_t sequence_ = 0;  // of the newest
   Counters counters_;
 };
 
