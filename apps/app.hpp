@@ -153,7 +153,7 @@ struct Options {
   void enterBus() const {
     if (private_bus) enterPrivateBus();
     joinIfNamed(join);
-    const bool own = private_bus || !join.empty() || process.lockstep || url->count() > 0;
+    const bool own = private_bus || !join.empty() || process.lockstep || (url && url->count() > 0);
     if (!own && process.url == defaultUrl(""))
       fmt::print(stderr, "bus: {} (LCM_DEFAULT_URL)\n", process.url);
   }
