@@ -488,6 +488,9 @@ class Run:
             for k, name in enumerate(names):
                 line, = axes.plot(t, scale * pose[:, part][:, k], label=name)
                 axes.plot(t, scale * commanded[:, part][:, k], "--", color=line.get_color(), linewidth=0.8)
+            low, high = axes.get_ylim()
+            if high - low < 1.0:  # a millimetre, a degree: nothing moved
+                axes.set_ylim((low + high) / 2 - 0.5, (low + high) / 2 + 0.5)
             axes.set_ylabel(label)
             axes.legend(loc="upper right")
             axes.grid(alpha=0.3)

@@ -156,7 +156,7 @@ class Element {
     return *value;
   }
 
-  /// So many numbers with blanks between them; `fallback` where there are none.
+  /// So many numbers with blanks between them.
   template <int N>
   Eigen::Matrix<double, N, 1> numbers(std::string_view key) {
     const std::string& text = required(key);
