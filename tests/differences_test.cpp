@@ -37,6 +37,7 @@ TEST(Evidence, IsOfThePoseThatFailed) {
             "x at 305.4 mm, want at most 305.0 (safety.translation_m)");
   row.state.x_dot[0] = 0.0;
   EXPECT_EQ(evidence(Check::kVelocity, row, e), "safety.leg_velocity_m_per_s 0.75");
+  EXPECT_EQ(evidence(Check::kCount, row, e), "");
 }
 
 TEST(Differences, NameTheLeavesThatWereChanged) {

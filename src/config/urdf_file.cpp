@@ -363,9 +363,11 @@ class Reader {
       mass.warn(mass.line(), fmt::format("mass of {} kg and more: g?", kOddMass),
                 fmt::format(" ({:g})", body.mass));
     body.p_BoBcm_B = X_link_com.p;
-    const auto I = [&](const char* key) { return inertia.within(key, kMaxInertia); };
-    const Mat3 about = inertiaOf(
-        (Vec6() << I("ixx"), I("iyy"), I("izz"), I("ixy"), I("ixz"), I("iyz")).finished());
+    Vec6 moments;  // an Eigen initializer must not be left by an exception
+    int next = 0;
+    for (const char* key : {"ixx", "iyy", "izz", "ixy", "ixz", "iyz"})
+      moments(next++) = inertia.within(key, kMaxInertia);
+    const Mat3 about = inertiaOf(moments);
     body.I_Bcm_B = X_link_com.R * about * X_link_com.R.transpose();
     judgeInertia(inertia, body.mass, symmetricEigenvalues(about));
     mass.finish();

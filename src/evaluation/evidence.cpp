@@ -115,6 +115,7 @@ std::string limitsOf(Check check, const Experiment& e) {
 }  // namespace
 
 std::string evidence(Check check, const Row& row, const Experiment& e) {
+  if (check >= Check::kCount) return {};  // it never armed
   const SafetyLimits& limits = e.controller.safety;
   const Geometry& g = e.controller.geometry;
   const Proposed p = proposed(row, e.controller);
