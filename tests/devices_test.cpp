@@ -415,6 +415,16 @@ TEST(StreamParser, FindsFramesInPiecesOfAnySizeAndAfterNoise) {
     }
 }
 
+// What the default description says of a checksum counts for nothing then.
+TEST(StreamParser, FramesWithoutAChecksumMayBeShort) {
+  StreamParser parser(streamOf({"checksum=none", "length=12", "first=0", "sync=[1]"}));
+  std::vector<std::uint8_t> bytes(12, 0);
+  bytes[0] = 1;
+  const std::vector<Vec6> got = parsed(parser, bytes, 12);
+  ASSERT_EQ(got.size(), 1u);
+  EXPECT_NEAR(got[0](0), 0.01, 1e-15);
+}
+
 TEST(StreamParser, ReadsLinesWithAnyChannelsAndSigns) {
   StreamParser parser(streamOf({"values=text", "first=1", "separators=;", "checksum=none",
                                 "channels=[fz, fx, fy, mz, mx, my]", "scale=[-1, 1, 1, 2, 1, 1]"}));

@@ -8,8 +8,7 @@
 namespace ves {
 namespace {
 
-constexpr std::size_t kRemembered = 4096;  // [-] events that one may repeat
-constexpr std::size_t kPatience = 64;      // [-] ticks that wait for an earlier one
+constexpr std::size_t kPatience = 64;  // [-] ticks that wait for an earlier one
 
 }  // namespace
 
@@ -32,9 +31,10 @@ bool OrderedLog::next(LogEvent& event) {
       continue;
     }
     if (event.channel == channel::kSample) {
-      if (const auto sample = event.as<sample_t>()) samples_.insert(sample->header.sequence);
+      if (const auto sample = event.as<sample_t>()) samples_.put(sample->header.sequence, true);
     } else if (event.channel == channel::kTruth) {
-      if (const auto truth = event.as<truth_t>()) truths_.insert(truth->header.sequence);
+      if (const auto truth = event.as<truth_t>()) truths_.put(truth->header.sequence, true);
+      has_truths_ = true;
     } else if (event.channel == channel::kState && hold(event)) {
       continue;
     }
@@ -46,12 +46,9 @@ bool OrderedLog::isRepeat(const LogEvent& event) {
   const std::string_view bytes(reinterpret_cast<const char*>(event.data.data()), event.data.size());
   const std::size_t hash =
       std::hash<std::string_view>()(bytes) ^ (std::hash<std::string>()(event.channel) << 1);
-  if (!known_.insert(hash).second) return true;
-  order_.push_back(hash);
-  if (order_.size() > kRemembered) {
-    known_.erase(order_.front());
-    order_.pop_front();
-  }
+  const auto key = static_cast<std::int64_t>(hash);
+  if (known_.find(key)) return true;
+  known_.put(key, true);
   return false;
 }
 
@@ -67,9 +64,9 @@ bool OrderedLog::hold(const LogEvent& event) {
 
 bool OrderedLog::ready() const {
   const auto& [count, first] = *waiting_.begin();
-  return count == last_ + 1 &&
-         (first.sample < 0 ||
-          (samples_.count(first.sample) && (truths_.empty() || truths_.count(first.sample))));
+  const bool used_is_here = first.sample < 0 || (samples_.find(first.sample) &&
+                                                 (!has_truths_ || truths_.find(first.sample)));
+  return count == last_ + 1 && used_is_here;
 }
 
 }  // namespace ves

@@ -6,7 +6,6 @@
 
 #include <map>
 #include <optional>
-#include <unordered_set>
 
 #include "ves/bus/event_log.hpp"
 #include "ves/bus/messages.hpp"
@@ -35,16 +34,16 @@ class OrderedLog {
   LogReader reader_;
   bool over_ = false;
   std::int64_t repeated_ = 0;
-  std::unordered_set<std::size_t> known_;  // hashes of the last events
-  std::deque<std::size_t> order_;
+  Recent<bool> known_;  // by the hash of their bytes
   std::optional<Identity> controller_;
   std::int64_t last_ = -1;  // [-] state_t.count of the last tick that was given out
   struct Waiting {
     LogEvent event;
     std::int64_t sample;
   };
-  std::map<std::int64_t, Waiting> waiting_;            // by count
-  std::unordered_set<std::int64_t> samples_, truths_;  // sequences that have come
+  std::map<std::int64_t, Waiting> waiting_;  // by count
+  Recent<bool> samples_, truths_;            // that have come
+  bool has_truths_ = false;
 };
 
 }  // namespace ves

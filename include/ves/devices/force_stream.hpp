@@ -4,7 +4,6 @@
 // a pipe: StreamSource (config/experiment.hpp) says how they look. docs/machine.md has examples.
 #pragma once
 
-#include <functional>
 #include <string>
 
 #include "ves/config/experiment.hpp"

@@ -12,7 +12,7 @@
 
 namespace ves::devices {
 
-/// The sensor's web page, and the address of the host's that answered.
+/// The sensor's web page, and which of the host's addresses answered.
 struct NetFtPage {
   std::string xml, ip;
 };
