@@ -60,6 +60,9 @@ TEST(NoHeapInOrders, ThroughEveryOrder) {
   const auto order = [](Request request, const Segment& segment = {}) {
     return Order{request, segment, {}};
   };
+  Order another = order(Request::kVehicle);
+  another.vehicle = {{2.0, 0.0, 0.5}, 1.0};
+  another.verdict = {Stability::kStable, Stability::kStable};
   const Order orders[] = {order(Request::kArm),
                           order(Request::kRun, test::segment(SegmentKind::kCalibration)),
                           order(Request::kTare),
@@ -68,6 +71,7 @@ TEST(NoHeapInOrders, ThroughEveryOrder) {
                           order(Request::kRun, test::sine(2, 0.4, 0.5, 5.0)),  // refused: outside
                           order(Request::kRun, test::segment(SegmentKind::kMove)),
                           order(Request::kRun, test::segment(SegmentKind::kAdmittance, 1.0)),
+                          another,
                           order(Request::kUncompensate),
                           order(Request::kCompensate),
                           order(Request::kReset),  // refused: not stopped

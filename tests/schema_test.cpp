@@ -249,7 +249,12 @@ std::set<std::string> everTold() {
                 "controller.passivity.enabled=true", "controller.passivity.reserve_j=0",
                 "controller.passivity.damping_per_s=5"});
     Lockstep loop = loopOf("puma_on_table_4_1", set);
-    order(loop, Request::kStart, 2500);
+    order(loop, Request::kStart, 700);
+    Order another{Request::kVehicle, {}, {7, ++orders}};
+    another.vehicle = {{2.0, 0.5, 3.0}, 1.0};
+    another.verdict = {Stability::kStable, Stability::kStable};
+    look(loop.step(another));
+    run(loop, 1800);
     Lockstep pushed = loopOf("puma_on_table_4_1", {"base.stiffness_diagonal=[150, 250, 400, "
                                                    "1500, 1000, 2000]"});
     pushed.disturb = [](Sample& s) {

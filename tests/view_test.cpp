@@ -447,7 +447,7 @@ class Live : public testing::Test {
 
   /// A state of a controller that began at `epoch`.
   void tell(std::int64_t source, std::int64_t epoch, std::int64_t number, bool engaged) {
-    state_t state{};
+    state_t state = toMessage(TickState(), {});
     state.header = header({source, epoch}, number, 0);
     state.phase = static_cast<int>(engaged ? Phase::kRunning : Phase::kDisarmed);
     state.segment = segment;

@@ -290,4 +290,45 @@ std::string applyStabilityCheck(ControllerConfig& controller, const RobotTask& t
   return why;
 }
 
+namespace {
+
+/// Shares of the straight way between two vehicles, the last one 1, so close together that no
+/// factor changes by more than a fifth from one to the next.
+std::set<double> placesBetween(const VehicleFactors& from, const VehicleFactors& to) {
+  std::set<double> out = {1.0};
+  const auto along = [&](double a, double b) {
+    const int n = static_cast<int>(std::ceil(std::abs(std::log(b / a)) / std::log(1.2)));
+    for (int i = 1; i < n; ++i)
+      out.insert((a * std::pow(b / a, static_cast<double>(i) / n) - a) / (b - a));
+  };
+  along(from.mass, to.mass);
+  along(from.damping, to.damping);
+  along(from.stiffness, to.stiffness);
+  return out;
+}
+
+}  // namespace
+
+VehicleVerdict assessChange(const ControllerConfig& controller, const RobotTask& task,
+                            const VehicleFactors& from, const VehicleFactors& to) {
+  if (controller.stability == Stability::kForced) return {Stability::kForced, Stability::kForced};
+  const std::set<double> places = placesBetween(from, to);
+  const auto assess = [&](const Compensation& compensation) {
+    const auto grows = [&](double share) {
+      const auto between = [&](double a, double b) { return a + share * (b - a); };
+      ControllerConfig changed = controller;
+      changed.compensation = compensation;
+      changed.admittance = scaled(controller.admittance,
+                                  {between(from.mass, to.mass), between(from.damping, to.damping),
+                                   between(from.stiffness, to.stiffness)});
+      return !isStable(changed, task) || !contactsDecay(changed, task);
+    };
+    // The end first: it is what is refused most often.
+    return std::any_of(places.rbegin(), places.rend(), grows) ? Stability::kUnstable
+                                                              : Stability::kStable;
+  };
+  const Stability published = assess({});
+  return {controller.compensation.any() ? assess(controller.compensation) : published, published};
+}
+
 }  // namespace ves

@@ -213,6 +213,8 @@ std::optional<Order> fromMessage(const operator_t& m) noexcept {
   } else {  // nothing else of it counts, nor can it make a stop unheard
     order.request = static_cast<Request>(m.request);
     order.controller = m.controller;
+    if (order.request == Request::kVehicle)
+      order.vehicle = {{m.vehicle_mass, m.vehicle_damping, m.vehicle_stiffness}, m.vehicle_over};
   }
   order.id = {m.header.source, m.header.sequence};
   return ifPlausible(order);

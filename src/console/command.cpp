@@ -131,6 +131,29 @@ Segment move(Words& words, const SafetyLimits& limits) {
   return s;
 }
 
+/// "in 2 stiffness 2 mass 0.5"; what is not named stays.
+VehicleOrder vehicle(Words& words) {
+  VehicleOrder order;
+  const std::pair<const char*, double*> factors[] = {
+      {"mass", &order.to.mass}, {"damping", &order.to.damping}, {"stiffness", &order.to.stiffness}};
+  do {
+    const std::string word = words.word("mass, damping, stiffness or in");
+    if (word == "in") {
+      order.over = words.seconds("in", 0.0);
+      continue;
+    }
+    const auto* one = std::find_if(std::begin(factors), std::end(factors),
+                                   [&](const auto& factor) { return word == factor.first; });
+    if (one == std::end(factors))
+      throw InputError(fmt::format("'{}', want mass, damping, stiffness or in", word));
+    if (*one->second > 0.0) throw InputError(word + ": given twice");
+    *one->second = words.number(word, kLeastVehicleFactor, kMostVehicleFactor, "times");
+  } while (!words.empty());
+  if (order.to == VehicleFactors{0.0, 0.0, 0.0})
+    throw InputError("nothing to change, want mass, damping or stiffness");
+  return order;
+}
+
 RobotMove robotMove(Words& words, const Experiment& experiment) {
   const std::vector<std::string>& names = experiment.robot.joint_names;
   const std::string joint = words.word("joint");
@@ -231,6 +254,8 @@ const std::vector<Item>& menu() {
       {Verb::kReset, "reset", "", "out of a stop, back to disarmed"},
       {Verb::kCompensate, "compensate", "", "lag and inertia out, as far as configured"},
       {Verb::kUncompensate, "uncompensate", "", "as published again"},
+      {Verb::kVehicle, "vehicle", "[in SECONDS] [mass|damping|stiffness FACTOR]...",
+       "another vehicle: times the scenario's"},
       {Verb::kWait, "wait", "SECONDS", "nothing, for so long"},
       {Verb::kHelp, "help", "", "this list"},
       {Verb::kQuit, "quit", "", "home, let go, end"},
@@ -287,6 +312,10 @@ Command parseCommand(const std::string& line, const Experiment& experiment) {
     case Verb::kReset: order.request = Request::kReset; break;
     case Verb::kCompensate: order.request = Request::kCompensate; break;
     case Verb::kUncompensate: order.request = Request::kUncompensate; break;
+    case Verb::kVehicle:
+      order.request = Request::kVehicle;
+      order.vehicle = vehicle(words);
+      break;
     case Verb::kStop:
     case Verb::kQuit: order.request = Request::kStop; break;
     case Verb::kRobot: command.robot = robotMove(words, experiment); break;

@@ -41,6 +41,15 @@ class Form {
         add("seconds", "5", kSeconds);
         add(fmt::format("axes of, one of {}", fmt::join(kToolFrameNames, " ")), "robot");
         break;
+      case Verb::kVehicle:
+        text_ += " in";
+        add("seconds", "2", kSeconds);
+        for (const char* factor : {"mass", "damping", "stiffness"}) {
+          text_ += fmt::format(" {}", factor);
+          add(fmt::format("{}, times the scenario's", factor), "1",
+              between(kLeastVehicleFactor, kMostVehicleFactor, "times"));
+        }
+        break;
       case Verb::kGrasp: add("kg", "1", between(0.0, 1e6, "kg")); break;
       case Verb::kCollect:
         add("file", "collected.csv");

@@ -37,6 +37,10 @@ std::string statusText(const Status& status) {
   } else {
     out += "  bias       none: not calibrated\n";
   }
+  if (s.vehicle_mass != 1.0 || s.vehicle_damping != 1.0 || s.vehicle_stiffness != 1.0)
+    out += fmt::format(
+        "  vehicle    mass {:.3g}, damping {:.3g}, stiffness {:.3g} times the scenario's\n",
+        s.vehicle_mass, s.vehicle_damping, s.vehicle_stiffness);
   out += fmt::format("  checks     {}", s.tripped ? failing(s.tripped) + " failing" : "all pass");
   if (status.timing)
     out += fmt::format(

@@ -29,6 +29,7 @@ std::string_view name(Request request) noexcept {
     case Request::kCompensate: return "compensate";
     case Request::kUncompensate: return "uncompensate";
     case Request::kOvertaken: return "overtaken";
+    case Request::kVehicle: return "vehicle";
     case Request::kCount: break;
   }
   return "unknown";
@@ -50,6 +51,7 @@ std::string_view name(Refusal refusal) noexcept {
     case Refusal::kChecking: return "its path is being checked";
     case Refusal::kOvertaken: return "a hold, a stop or a failing check came before it";
     case Refusal::kTooLong: return "the loop grows slowly, and would grow too much in that time";
+    case Refusal::kTooFast: return "a mode of that vehicle would be too fast for the period";
     case Refusal::kCount: break;
   }
   return "unknown";

@@ -73,6 +73,12 @@ bool plausible(const HandOrder& order) {
 
 bool plausible(const Release&) { return true; }
 
+bool plausible(const VehicleOrder& order) {
+  for (const double factor : {order.to.mass, order.to.damping, order.to.stiffness})
+    if (!(factor == 0.0 || inRange(factor, kLeastVehicleFactor, kMostVehicleFactor))) return false;
+  return inRange(order.over, 0.0, kMaxOrderTime);
+}
+
 }  // namespace
 
 bool plausible(const Sample& s) noexcept {
@@ -98,6 +104,7 @@ bool plausible(const Order& order) noexcept {
   const Request request = order.request;
   if (!known(request) || request == Request::kNone || request == Request::kOvertaken) return false;
   if (order.id.sequence < 0) return false;
+  if (request == Request::kVehicle) return plausible(order.vehicle);
   if (request != Request::kRun) return true;
   const Segment& s = order.segment;
   const bool takes_time = s.kind == SegmentKind::kTrajectory || s.kind == SegmentKind::kAdmittance;

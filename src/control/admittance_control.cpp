@@ -13,6 +13,7 @@ AdmittanceControl::AdmittanceControl(const ControllerConfig& config)
       wrench_delay_(wrenchDelay(config.servo, config.periodSeconds())),
       port_(config),
       energy_(config),
+      change_(config.periodSeconds(), config.passivity.damping),
       period_(config.periodSeconds()),
       joint_moves_(config.stillness.joint),
       braking_(config.gentle.braking),
@@ -23,6 +24,7 @@ AdmittanceControl::AdmittanceControl(const ControllerConfig& config)
 }
 
 void AdmittanceControl::begin(const Vec6& x, const Mat6& M_1, double age, double share) noexcept {
+  change_.finish(model_);
   model_.reset(x, M_1, inertia_ ? age + share * wrench_delay_ : 0.0);
   begins_ = true;
   oscillation_.reset();
@@ -30,19 +32,33 @@ void AdmittanceControl::begin(const Vec6& x, const Mat6& M_1, double age, double
   energy_.reset();
 }
 
+bool AdmittanceControl::affords(const VehicleOrder& order) const noexcept {
+  return !(inertia_ || model_.coupled()) || model_.affords(change_.ordered(order));
+}
+
+void AdmittanceControl::change(const VehicleOrder& order, bool emulated) noexcept {
+  change_.begin(order, model_);
+  if (!emulated) change_.finish(model_);
+}
+
 const PathPoint<6>& AdmittanceControl::step(const AdmittanceInput& in, const Vec6& last,
                                             const PathChecks& checks) noexcept {
   if (in.F_Po_I.stacked().allFinite()) {
     const double since = begins_ ? std::min(in.wrench.since, period_) : in.wrench.since;
     begins_ = false;
+    change_.advance(model_);
+    const double damping = energy_.damping() + change_.damping();
     if (inertia_)
-      model_.step(in.F_Po_I, in.M_1, since, in.wrench.age + in.share * wrench_delay_,
-                  energy_.damping());
+      model_.step(in.F_Po_I, in.M_1, since, in.wrench.age + in.share * wrench_delay_, damping);
     else
-      model_.step(in.F_Po_I, energy_.damping());
+      model_.step(in.F_Po_I, damping);
     slowInsideEnvelope(last, in.L, checks);
+    // Each is paid by its share of the damping.
+    const double for_change =
+        change_.damping() > 0.0 ? model_.damped() * (change_.damping() / damping) : 0.0;
+    change_.pay(for_change);
     energy_.take(model_.taken(in.F_Po_I), port_.take(in.F_Po_I, in.wrench.time, in.X_IP, in.servo),
-                 model_.damped(), model_.kineticEnergy());
+                 model_.damped() - for_change, model_.kineticEnergy());
     const SafetyLimits& limits = checks.limits();
     const bool held = scale_ < 1.0 && model_.kineticEnergy() > limits.growth_floor;
     oscillation_.take(limits, model_.energy(), held, in.q, joint_moves_, period_);

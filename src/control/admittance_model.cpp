@@ -11,6 +11,11 @@
 
 namespace ves {
 
+ModalModel scaled(const ModalModel& model, const VehicleFactors& f) {
+  return {model.Phi / std::sqrt(f.mass), model.stiffness * (f.stiffness / f.mass),
+          model.damping * (f.damping / f.mass)};
+}
+
 ModalHold modalHold(const ModalModel& model, double dt) {
   const Eigen::Index k = model.stiffness.size();
   ModalHold out;
@@ -124,6 +129,16 @@ ModalDynamics ModalDynamics::withoutDampingAbove(double most) const noexcept {
   return out;
 }
 
+ModalDynamics ModalDynamics::scaled(const VehicleFactors& f) const noexcept {
+  ModalDynamics out = *this;
+  out.k_ *= f.stiffness / f.mass;
+  out.c_ *= f.damping / f.mass;
+  out.damping_ *= f.damping / f.mass;
+  out.fastest_ *= std::sqrt(f.stiffness / f.mass);
+  out.most_damping_ *= f.damping / f.mass;
+  return out;
+}
+
 /// Woodbury: (1 + Phi^T M_1 Phi)^-1 = 1 - Phi^T (1 + M_1 Phi Phi^T)^-1 M_1 Phi.
 ModalDynamics::Body ModalDynamics::body(const Mat6& M_1) const noexcept {
   const Mat6 left = Mat6::Identity() + M_1.lazyProduct(compliance_);
@@ -172,13 +187,26 @@ ModalDynamics::Modes ModalDynamics::advance(const Body& body, double dt, const M
 }
 
 AdmittanceModel::AdmittanceModel(const ModalModel& model, double period)
-    : dynamics_(model),
+    : nominal_(model),
+      dynamics_(nominal_),
       Phi_pinv_(leastSquares(model.Phi, Mat6::Identity())),
       period_(period),
       step_(dynamics_.hold(period)) {
   now_.modes = dynamics_.atRest();
   before_ = now_;
   damping_.setZero(dynamics_.size());
+}
+
+void AdmittanceModel::become(const VehicleFactors& factors) noexcept {
+  if (factors == factors_) return;
+  factors_ = factors;
+  dynamics_ = nominal_.scaled(factors);
+  if (!dynamics_.coupled()) step_ = dynamics_.hold(period_);
+}
+
+double AdmittanceModel::costOf(const VehicleFactors& to) const noexcept {
+  return (to.mass - factors_.mass) * 0.5 * now_.modes.eta_dot.squaredNorm() +
+         (to.stiffness - factors_.stiffness) * nominal_.potentialEnergy(now_.modes);
 }
 
 void AdmittanceModel::reset(const Vec6& x, const Mat6& M_1, double ahead) noexcept {
@@ -194,26 +222,33 @@ void AdmittanceModel::reset(const Vec6& x, const Mat6& M_1, double ahead) noexce
   if (!(ahead > 0.0)) return;
   const ModalDynamics light = dynamics_.withoutDampingAbove(kMostGrowth / ahead);
   const ModalDynamics::Forces none = ModalDynamics::Forces::Zero(dynamics_.size());
-  modes = light.advance(light.body(M_1), -ahead, modes, none);
+  modes = light.advance(light.body(M_1 / factors_.mass), -ahead, modes, none);
 }
 
 void AdmittanceModel::step(const Wrench& F_Po_I, double damping) noexcept {
   before_ = now_;
   ModalDynamics::Forces u;  // Phi^T F
   u.noalias() = dynamics_.Phi().transpose() * F_Po_I.stacked();
+  u /= factors_.mass;
   damping_ = -damping * before_.modes.eta_dot;
   u += damping_;
-  now_.modes = dynamics_.advance(step_, before_.modes, u);
+  // The coupled transition of another vehicle would be computed on the heap.
+  const bool by_series = dynamics_.coupled() && factors_ != VehicleFactors();
+  now_.modes = by_series
+                   ? dynamics_.advance(dynamics_.body(Mat6::Zero()), period_, before_.modes, u)
+                   : dynamics_.advance(step_, before_.modes, u);
   now_.motion = at(now_.modes, dynamics_.acceleration(now_.modes, u));
 }
 
 void AdmittanceModel::step(const Wrench& F_Po_I, const Mat6& M_1, double dt, double ahead,
                            double damping) noexcept {
-  const ModalDynamics::Body body = dynamics_.body(M_1);
+  const Mat6 M_1_per_mass = M_1 / factors_.mass;
+  const ModalDynamics::Body body = dynamics_.body(M_1_per_mass);
   before_ = now_;
   ModalDynamics::Forces u;
   u.noalias() = dynamics_.Phi().transpose() * F_Po_I.stacked();
-  const Vec6 momentum = M_1 * (dynamics_.Phi() * before_.modes.eta_dot);
+  u /= factors_.mass;
+  const Vec6 momentum = M_1_per_mass * (dynamics_.Phi() * before_.modes.eta_dot);
   damping_ = -damping * before_.modes.eta_dot;
   damping_.noalias() -= damping * dynamics_.Phi().transpose() * momentum;
   u += damping_;

@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/control/energy_account.hpp"
 
-#include <algorithm>
-
 namespace ves {
 
 EnergyAccount::EnergyAccount(const ControllerConfig& config) noexcept
-    : passivity_(config.passivity) {
-  constexpr double kRise = 0.05;  // [s] from none to all of the damping
-  slew_ = passivity_.damping * std::min(1.0, config.periodSeconds() / kRise);
+    : passivity_(config.passivity), slew_(dampingSlew(passivity_.damping, config.periodSeconds())) {
   reset();
 }
 

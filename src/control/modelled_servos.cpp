@@ -78,7 +78,8 @@ ModelledServos::Channels ModelledServos::pass(const Passage& passage) noexcept {
 }
 
 Vec6 ModelledServos::reading(const Vec6& L, const Vec6& v) const noexcept {
-  constexpr double kWhole = 6755399441055744.0;  // 1.5 * 2^52: adding it rounds to the nearest integer
+  constexpr double kWhole =
+      6755399441055744.0;  // 1.5 * 2^52: adding it rounds to the nearest integer
   const auto offset = servo_.readings.offset.array(), scale = servo_.readings.scale.array();
   const Channels newer = (L.array() - offset) / scale + kWhole,
                  older = ((L - 2.0 * servo_.reading_age * v).array() - offset) / scale + kWhole;

@@ -12,18 +12,6 @@ bool forbids(Tripped tripped) {
   return (tripped.bits() & ~waiting.bits()) != 0;
 }
 
-/// Why the loop, its compensation in or out, may not be closed for `duration` [s].
-Refusal refusesLoop(const ControllerConfig& config, bool compensated, double duration) {
-  const double stable_for = compensated ? config.stable_for : config.stable_for_uncompensated;
-  switch (config.stabilityOf(compensated)) {
-    case Stability::kStable: return duration <= stable_for ? Refusal::kNone : Refusal::kTooLong;
-    case Stability::kForced: return Refusal::kNone;
-    case Stability::kUnstable: return Refusal::kUnstable;
-    case Stability::kUnknown: break;
-  }
-  return Refusal::kUnassessed;
-}
-
 }  // namespace
 
 void Supervisor::handle(const Order& order, const Situation& now, Actuation act) noexcept {
@@ -64,9 +52,29 @@ Refusal Supervisor::obey(const Order& order, const Situation& now, Actuation act
       return Refusal::kNone;
     case Request::kCompensate: return compensate(true, now, act);
     case Request::kUncompensate: return compensate(false, now, act);
+    case Request::kVehicle: return changeVehicle(order, now, act);
     case Request::kReset: return reset(act);
   }
   return Refusal::kNone;
+}
+
+/// Why the loop, its compensation in or out, may not be closed for `duration` [s].
+Refusal Supervisor::refusesLoop(const ControllerConfig& config, bool compensated,
+                                double duration) const noexcept {
+  Stability stability = config.stabilityOf(compensated);
+  double stable_for = compensated ? config.stable_for : config.stable_for_uncompensated;
+  if (changed_) {
+    stability = compensated ? changed_->compensated : changed_->uncompensated;
+    stable_for = HUGE_VAL;
+  }
+  switch (stability) {
+    case Stability::kStable: return duration <= stable_for ? Refusal::kNone : Refusal::kTooLong;
+    case Stability::kForced: return Refusal::kNone;
+    case Stability::kUnstable: return Refusal::kUnstable;
+    case Stability::kUnknown:
+    case Stability::kCount: break;
+  }
+  return Refusal::kUnassessed;
 }
 
 /// The legs are taken, or soon will be gone from.
@@ -139,6 +147,22 @@ Refusal Supervisor::compensate(bool in, const Situation& now, Actuation act) noe
   const Refusal unstable = refusesLoop(now.config, in, duration);
   if (unstable != Refusal::kNone && runs(act.motion, SegmentKind::kAdmittance)) return unstable;
   act.share.want(in);
+  return Refusal::kNone;
+}
+
+/// All of the way to another vehicle was checked, with the compensation in and out.
+Refusal Supervisor::changeVehicle(const Order& order, const Situation& now,
+                                  Actuation act) noexcept {
+  if (!ours()) return Refusal::kNotArmed;
+  if (!act.motion.admittance().affords(order.vehicle)) return Refusal::kTooFast;
+  const std::optional<VehicleVerdict> before = changed_;
+  changed_ = order.verdict;
+  const Refusal unstable = refusesLoop(now.config, act.share.wanted(), HUGE_VAL);
+  if (unstable != Refusal::kNone) {
+    changed_ = before;
+    return unstable;
+  }
+  act.motion.changeVehicle(order.vehicle, runs(act.motion, SegmentKind::kAdmittance));
   return Refusal::kNone;
 }
 

@@ -145,6 +145,9 @@ const TickState& TestPlatform::report(const TickInput& in, const Wrenches& W) no
   state_.compensation_share = share_.value();
   state_.motion = motion_.motion();
   state_.desired = motion_.desired();
+  state_.request_verdict = in.order.verdict;
+  state_.vehicle = motion_.admittance().vehicle();
+  state_.vehicle_energy = motion_.admittance().vehicleChange().energy();
   state_.envelope_scale = motion_.admittance().scale();
   const EnergyAccount& energy = motion_.admittance().energy();
   state_.energy_put_in = energy.putIn();

@@ -101,7 +101,14 @@ std::optional<Motion> baseMotion(const Experiment& e, const Vec6& start,
   return *references.of(interaction, e.controller.period, duration, eta);
 }
 
+bool ofConfiguredVehicle(const state_t& s) noexcept {
+  return s.vehicle_mass == 1.0 && s.vehicle_damping == 1.0 && s.vehicle_stiffness == 1.0;
+}
+
 std::optional<Emulation> emulation(const Series& series, ReferenceMotions& references) {
+  if (!std::all_of(series.rows.begin(), series.rows.end(),
+                   [](const Row& row) { return ofConfiguredVehicle(row.state); }))
+    return {};
   Emulation out;
   out.platform = actual(series);
   if (out.platform.x.size() < 2) return {};

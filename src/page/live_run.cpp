@@ -130,6 +130,7 @@ void LiveRun::followBase(const state_t& state) {
     const auto base = computing_.get();
     if (let_go_ && let_go_->computed) base_ = base;
   }
+  if (!ofConfiguredVehicle(state)) base_.reset();
 }
 
 void LiveRun::measureRate(const state_t& state) {

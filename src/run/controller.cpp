@@ -9,6 +9,7 @@
 #include "ves/run/flight_record.hpp"
 #include "ves/run/run.hpp"
 #include "ves/run/run_monitor.hpp"
+#include "ves/run/vehicle_judge.hpp"
 
 namespace ves {
 namespace {
@@ -18,7 +19,7 @@ constexpr int kAnswerTime = 200;         // [ms] lockstep, before a message is r
 constexpr int kAnswerTries = 50;         // [-] before the other side counts as gone
 constexpr std::int64_t kFirstSampleTime = 10'000'000'000;  // [ns]
 constexpr std::int64_t kHello = 100'000'000;               // [ns] between two of them
-constexpr std::int64_t kWarnAfter = 2'000'000'000;        // [ns]
+constexpr std::int64_t kWarnAfter = 2'000'000'000;         // [ns]
 
 /// Counts the times of this tick into the histograms.
 void count(timing_t& t) noexcept {
@@ -74,6 +75,7 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
   Announcer announcer(bus, options.url, describe(experiment, self, 0),
                       setupOf(experiment, options.lockstep));
 
+  VehicleJudge judge(experiment);
   TickInput in;
   if (options.start) in.order.request = Request::kStart;
   const std::int64_t start = monotonicNow();
@@ -82,6 +84,7 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
     announcer.tell(state.phase);
     in.order = watch(state);
     if (in.order.request == Request::kNone) in.order = link.takeOrder();
+    in.order = options.lockstep ? judged(in.order, experiment, state) : judge.pass(in.order, state);
     in.conflicting_node = link.takeConflict();
     return monitor.reached(state, in.order.request);
   };

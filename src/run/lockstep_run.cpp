@@ -9,6 +9,7 @@
 #include "ves/run/run.hpp"
 #include "ves/run/run_monitor.hpp"
 #include "ves/run/truth.hpp"
+#include "ves/run/vehicle_judge.hpp"
 
 namespace ves {
 
@@ -53,9 +54,9 @@ RunResult runRecorded(const Experiment& experiment, RunRecorder* recorder, const
           time());
     }
     Order& order = loop.input.order;
-    order = watch ? watch(state) : Order();
+    order = watch ? judged(watch(state), experiment, state) : Order();
     if (monitor.reached(state, order.request)) break;
-    if (order.request == Request::kRun) {
+    if (hasNumbers(order.request)) {
       order.id = {controller.source, orders++};
       order.controller = controller.source;
       if (recorder)

@@ -126,10 +126,16 @@ class Replayer {
     Order order;
     order.request = static_cast<Request>(recorded.request);
     order.id = {recorded.request_source, recorded.request_sequence};
-    if (order.request != Request::kRun) return order;
-    for (const Order& known : orders_)
-      if (known.id.source == order.id.source && known.id.sequence == order.id.sequence)
-        return known;
+    order.verdict = {static_cast<Stability>(recorded.request_stability),
+                     static_cast<Stability>(recorded.request_stability_uncompensated)};
+    if (!hasNumbers(order.request)) return order;
+    for (const Order& known : orders_) {
+      if (known.id.source != order.id.source || known.id.sequence != order.id.sequence) continue;
+      order.segment = known.segment;
+      order.vehicle = known.vehicle;
+      order.controller = known.controller;
+      return order;
+    }
     fail(fmt::format("tick {} followed order {}, which is not in this log",
                      recorded.header.sequence, order.id.sequence));
   }

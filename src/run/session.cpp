@@ -13,6 +13,7 @@ namespace {
 
 constexpr int kRepeat = 200;                          // [ms] an order without an answer
 constexpr int kRepeats = 10;                          // [-]
+constexpr int kRepeatsOfVehicle = 100;                // [-] the stability check takes its time
 constexpr std::int64_t kFirstState = 15'000'000'000;  // [ns]
 
 }  // namespace
@@ -98,7 +99,8 @@ std::optional<Refusal> Session::order(const Order& order) {
   const std::int64_t sequence = orders_++;
   Order addressed = order;
   addressed.controller = state_->header.source;
-  for (int i = 0; i < kRepeats && running(); ++i) {
+  const int repeats = order.request == Request::kVehicle ? kRepeatsOfVehicle : kRepeats;
+  for (int i = 0; i < repeats && running(); ++i) {
     bus_.publish(channel::kOperator, toMessage(addressed, header(self_, sequence, monotonicNow())));
     const std::int64_t repeat = monotonicNow() + kRepeat * 1'000'000LL;
     while (monotonicNow() < repeat && running()) {

@@ -33,6 +33,14 @@ Segment segment(fuzz::Bytes& in) {
   return s;
 }
 
+VehicleOrder vehicle(fuzz::Bytes& in) {
+  const auto factor = [&] { return in.take<std::uint8_t>() / 64.0; };  // [-] 0 to 4
+  VehicleOrder order;
+  order.to = {factor(), factor(), factor()};
+  order.over = 0.1 * in.take<std::uint8_t>();
+  return order;
+}
+
 Experiment experiment(std::vector<std::string> set) {
   set.insert(set.end(),
              {"controller.stability=forced", "controller.stability_uncompensated=forced"});
@@ -110,7 +118,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         input.order.request = Request::kRun;
         input.order.segment = segment(in);
         break;
-      case 11: input.order.request = static_cast<Request>(what / 16 % 8); break;
+      case 11:
+        input.order.request = static_cast<Request>(what / 16 % static_cast<int>(Request::kCount));
+        input.order.vehicle = vehicle(in);
+        input.order.verdict = {Stability::kStable, Stability::kStable};
+        break;
       case 12:
         s.switches = kAllSwitchesClosed;
         s.q = e.plant.task.initial_joints;

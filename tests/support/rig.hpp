@@ -83,6 +83,7 @@ class Rig {
   const TickState& tick(Request request = Request::kNone, const Segment& s = {}) {
     return loop_.step({request, s, {}});
   }
+  const TickState& give(const Order& order) { return loop_.step(order); }
   /// The same until it is answered: a path is gone through first.
   const TickState& order(Request request, const Segment& s = {}) {
     for (tick(request, s); state().refusal == Refusal::kChecking;) tick();

@@ -57,6 +57,11 @@ double allowedGrowth(const ControllerConfig& controller);
 bool contactsDecay(const ControllerConfig& controller, const RobotTask& task);
 LoopVerdict assessStability(const ControllerConfig& controller, const RobotTask& task);
 
+/// The verdict on a change of the vehicle in operation: the loop decays, and the tool may lean on
+/// what it touches, at places all along the way, for as long as one likes.
+VehicleVerdict assessChange(const ControllerConfig& controller, const RobotTask& task,
+                            const VehicleFactors& from, const VehicleFactors& to);
+
 /// In one line: what grows, how fast, and what would cure it.
 std::string explain(const LoopVerdict& verdict);
 

@@ -31,6 +31,7 @@ enum class Verb {
   kReset,
   kCompensate,
   kUncompensate,
+  kVehicle,
   kWait,
   kHelp,
   kQuit

@@ -88,6 +88,49 @@ struct Cue {
   std::int64_t after = 0;  // [ns]
 };
 
+/// What times the configured vehicle is emulated; modes share them.
+struct VehicleFactors {
+  double mass = 1.0, damping = 1.0, stiffness = 1.0;  // [-]
+
+  bool operator==(const VehicleFactors&) const = default;
+};
+
+inline constexpr double kLeastVehicleFactor = 0.01, kMostVehicleFactor = 100.0;  // [-]
+
+/// Another vehicle, while it is emulated.
+struct VehicleOrder {
+  VehicleFactors to{0.0, 0.0, 0.0};  // 0: stays
+  double over = 0.0;                 // [s]
+
+  /// What it leads to where `present` stays.
+  constexpr VehicleFactors appliedTo(const VehicleFactors& present) const noexcept {
+    const auto one = [](double factor, double stays) { return factor > 0.0 ? factor : stays; };
+    return {one(to.mass, present.mass), one(to.damping, present.damping),
+            one(to.stiffness, present.stiffness)};
+  }
+};
+
+/// Whether admittance control with this vehicle, robot and machine decays (analysis/gate.hpp).
+enum class Stability : std::int32_t {
+  kUnknown,   // not checked: refused
+  kStable,    // begins
+  kUnstable,  // refused
+  kForced,    // begins, whatever the check said
+  kCount
+};
+inline constexpr std::string_view kStabilityNames[] = {"unknown", "stable", "unstable", "forced"};
+static_assert(std::size(kStabilityNames) == static_cast<std::size_t>(Stability::kCount));
+constexpr std::string_view name(Stability stability) noexcept {
+  return stability < Stability::kCount ? kStabilityNames[static_cast<std::size_t>(stability)]
+                                       : "unknown";
+}
+
+/// The stability check of a change of the vehicle, compensation in and out. No message carries it
+/// to the controller: its own process asks.
+struct VehicleVerdict {
+  Stability compensated = Stability::kUnknown, uncompensated = Stability::kUnknown;
+};
+
 enum class Request : std::int32_t {
   kNone,
   kStart,         // take the legs, run the program, come home
@@ -100,6 +143,7 @@ enum class Request : std::int32_t {
   kCompensate,    // what the configuration has of compensation comes in
   kUncompensate,  // and goes out again: as published
   kOvertaken,     // an order that a hold or a stop came before: it is answered, and not obeyed
+  kVehicle,       // its mass, damping and stiffness change to the order's
   kCount
 };
 
@@ -121,6 +165,7 @@ enum class Refusal : std::int32_t {
   kChecking,        // not refused yet: its path is being checked, over some ticks
   kOvertaken,       // a hold, a stop or a failing check came before it began
   kTooLong,  // the loop grows, slowly: longer than the program's segments it was not let pass
+  kTooFast,  // a mode of the vehicle would be too fast to be followed with the robot on it
   kCount
 };
 
@@ -137,6 +182,13 @@ struct Order {
   Segment segment;  // of kRun
   OrderId id;
   std::int64_t controller = 0;  // header.source of the states of the one that is meant
+  VehicleOrder vehicle = {};    // of kVehicle,
+  VehicleVerdict verdict = {};  // and what the stability check says of it
 };
+
+/// An order of which the name is not all: it has to be kept to be given again.
+constexpr bool hasNumbers(Request request) noexcept {
+  return request == Request::kRun || request == Request::kVehicle;
+}
 
 }  // namespace ves

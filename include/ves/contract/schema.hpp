@@ -104,7 +104,8 @@ constexpr auto fields(S& s) {
 template <>
 inline constexpr Message kMessage<Order>{
     "operator_t",
-    "Operator -> controller. Channel VES_OPERATOR. Of what follows `request` only a run's counts."};
+    "Operator -> controller. Channel VES_OPERATOR. Of what follows `request` only a run's and a "
+    "vehicle's count."};
 
 /// header: source and sequence are `id`.
 template <Of<Order> S>
@@ -124,6 +125,11 @@ constexpr auto fields(S& s) {
       Field{"final", "m, rad", trajectory.final, "of a ramp, from home", kCoordinates},
       Field{"amplitude", "m, rad", trajectory.amplitude, "of a sine", kCoordinates},
       Field{"frequency", "Hz", trajectory.frequency, "of a sine", kCoordinates},
+      Field{"vehicle_mass", "-", s.vehicle.to.mass,
+            "of a vehicle: times the configured one's; 0: stays"},
+      Field{"vehicle_damping", "-", s.vehicle.to.damping, "the same"},
+      Field{"vehicle_stiffness", "-", s.vehicle.to.stiffness, "the same"},
+      Field{"vehicle_over", "s", s.vehicle.over, "that the change takes"},
   };
 }
 
@@ -260,12 +266,23 @@ constexpr auto fields(S& s) {
       Field{"rest", "count", s.command.rest, "the same", kLegs, "rest"},
       Field{"ahead_ns", "ns", s.command.ahead,
             "after this tick, for which x, leg and rest are meant"},
+      Field{"request_stability", "-", s.request_verdict.compensated,
+            "of a request for another vehicle: what the stability check says of it"},
+      Field{"request_stability_uncompensated", "-", s.request_verdict.uncompensated,
+            "the same with the compensation out"},
+      Field{"vehicle_mass", "-", s.vehicle.mass, "of the vehicle in use, times the configured"},
+      Field{"vehicle_damping", "-", s.vehicle.damping, "the same"},
+      Field{"vehicle_stiffness", "-", s.vehicle.stiffness, "the same"},
+      Field{"vehicle_energy", "J", s.vehicle_energy,
+            "that the last change of the vehicle has put in, less what was taken for it"},
   };
 }
 
 static_assert(members<Sample>() == 15 && members<LegCommand>() == 7 &&
-                  members<MachineSetup>() == 17 && members<TickState>() == 48 &&
-                  members<Order>() == 4 && members<Segment>() == 5 && members<Trajectory>() == 4,
+                  members<MachineSetup>() == 17 && members<TickState>() == 51 &&
+                  members<Order>() == 6 && members<VehicleOrder>() == 2 &&
+                  members<VehicleFactors>() == 3 && members<VehicleVerdict>() == 2 &&
+                  members<Segment>() == 5 && members<Trajectory>() == 4,
               "a member has come or gone: describe it above, and count it here");
 
 /// f(field) of each.

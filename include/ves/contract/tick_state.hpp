@@ -95,6 +95,9 @@ struct TickState {
   double passivity_damping = 0.0;
   std::int64_t late_ticks = 0;
   LegCommand command;
+  VehicleVerdict request_verdict;
+  VehicleFactors vehicle;
+  double vehicle_energy = 0.0;
 };
 
 }  // namespace ves

@@ -8,6 +8,7 @@
 #include "ves/control/monitors.hpp"
 #include "ves/control/path_checks.hpp"
 #include "ves/control/tick_clock.hpp"
+#include "ves/control/vehicle_change.hpp"
 
 namespace ves {
 
@@ -39,11 +40,18 @@ class AdmittanceControl {
   const PathPoint<6>& step(const AdmittanceInput& in, const Vec6& last,
                            const PathChecks& checks) noexcept;
 
+  /// Whether a vehicle with these factors can be stepped in a tick.
+  bool affords(const VehicleOrder& order) const noexcept;
+  /// Another vehicle: by and by while this one is emulated, else at once.
+  void change(const VehicleOrder& order, bool emulated) noexcept;
+
   /// The energy is watched from now on only.
   void forget() noexcept { oscillation_.reset(); }
 
   const Oscillation& oscillation() const noexcept { return oscillation_; }
   const EnergyAccount& energy() const noexcept { return energy_; }
+  const VehicleFactors& vehicle() const noexcept { return model_.factors(); }
+  const VehicleChange& vehicleChange() const noexcept { return change_; }
   double scale() const noexcept { return scale_; }  // [-] of the last step, 1: all of it was taken
 
  private:
@@ -56,6 +64,7 @@ class AdmittanceControl {
   Oscillation oscillation_;
   PortWork port_;
   EnergyAccount energy_;
+  VehicleChange change_;
   double period_;       // [s]
   double joint_moves_;  // [rad | m] what counts as a motion of the robot
   Braking braking_;     // before the limits

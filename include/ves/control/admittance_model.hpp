@@ -3,6 +3,7 @@
 // Admittance model (Appendices C and D): the base that the platform pretends to be.
 #pragma once
 
+#include "ves/contract/order.hpp"
 #include "ves/math/frames.hpp"
 #include "ves/math/quintic.hpp"
 
@@ -27,6 +28,9 @@ struct ModalModel {
            stiffness == other.stiffness && damping == other.damping;
   }
 };
+
+/// The model of such a vehicle, mass-normalised again.
+ModalModel scaled(const ModalModel& model, const VehicleFactors& factors);
 
 /// Exact over a length of time under a held modal force u: {eta, eta'} <- Phi {eta, eta'} + Gamma
 /// u.
@@ -83,6 +87,11 @@ class ModalDynamics {
   /// damping couples them and is more than that.
   ModalDynamics withoutDampingAbove(double most) const noexcept;
 
+  /// With the shapes as they are: under u = Phi^T F / factors.mass, the body M_1 / factors.mass.
+  ModalDynamics scaled(const VehicleFactors& factors) const noexcept;
+  /// [rad] that the fastest mode passes in dt [s].
+  double angle(double dt) const noexcept { return (fastest_ + most_damping_) * dt; }
+
   Modes atRest() const;
   /// [J] the modes are mass-normalised.
   double potentialEnergy(const Modes& m) const noexcept { return 0.5 * k_.dot(m.eta.cwiseAbs2()); }
@@ -103,6 +112,9 @@ class ModalDynamics {
 
 /// Steps a modal model by the exact zero-order hold. Coordinates are those of Pose about home,
 /// taken as small: the wrench's moments drive the fixed angles directly, as in (C.2).
+///
+/// Its mass m, damping c and stiffness k may be changed, all modes alike: m eta'' + c C eta' + k K
+/// eta = Phi^T W.
 class AdmittanceModel {
  public:
   /// Discretises for the period [s].
@@ -110,7 +122,8 @@ class AdmittanceModel {
 
   /// motion() is at rest at x. What the modes cannot express of x stays as a constant offset. Where
   /// motion() is predicted `ahead` [s] of the modes, these are propagated back by `ahead` along the
-  /// motion with M_1 that leads to x (without heavy damping), so that the prediction starts at rest.
+  /// motion with M_1 that leads to x (without heavy damping), so that the prediction starts at
+  /// rest.
   void reset(const Vec6& x, const Mat6& M_1 = Mat6::Zero(), double ahead = 0.0) noexcept;
 
   /// (C.6): the state one period after W began to act. `damping` [1/s] acts on every mode besides,
@@ -127,20 +140,37 @@ class AdmittanceModel {
   /// the path stays and only the motion along it is slowed.
   void slow(double share) noexcept;
 
-  /// [J] the modes are mass-normalised.
-  double kineticEnergy() const noexcept { return 0.5 * now_.modes.eta_dot.squaredNorm(); }
-  double energy() const noexcept { return kineticEnergy() + dynamics_.potentialEnergy(now_.modes); }
+  /// The next step's vehicle, where and as fast as this one is.
+  void become(const VehicleFactors& factors) noexcept;
+  const VehicleFactors& factors() const noexcept { return factors_; }
+  /// [J] that becoming so puts in.
+  double costOf(const VehicleFactors& factors) const noexcept;
+  /// Whether a step by series, with a body or with coupled modes, is short enough for a tick.
+  bool affords(const VehicleFactors& factors) const noexcept {
+    return nominal_.scaled(factors).angle(period_) <= kMostModalAngle;
+  }
+
+  /// [J]
+  double kineticEnergy() const noexcept {
+    return factors_.mass * 0.5 * now_.modes.eta_dot.squaredNorm();
+  }
+  double energy() const noexcept {
+    return kineticEnergy() + factors_.mass * dynamics_.potentialEnergy(now_.modes);
+  }
 
   /// [J] that the last step took of F_Po_I, and that its damping took.
   double taken(const Wrench& F_Po_I) const noexcept {
     return F_Po_I.stacked().dot(dynamics_.Phi() * (now_.modes.eta - before_.modes.eta));
   }
-  double damped() const noexcept { return -damping_.dot(now_.modes.eta - before_.modes.eta); }
+  double damped() const noexcept {
+    return -factors_.mass * damping_.dot(now_.modes.eta - before_.modes.eta);
+  }
 
   /// (C.7): position, velocity, acceleration at the last step's end, or ahead of it.
   const PathPoint<6>& motion() const noexcept { return now_.motion; }
 
   int modes() const noexcept { return static_cast<int>(dynamics_.size()); }
+  bool coupled() const noexcept { return dynamics_.coupled(); }
 
  private:
   using Modes = ModalDynamics::Modes;
@@ -153,12 +183,14 @@ class AdmittanceModel {
   PathPoint<6> at(const Modes& modes,
                   const ModalDynamics::Vector<kMaxModes>& acceleration) const noexcept;
 
+  ModalDynamics nominal_;  // as configured
   ModalDynamics dynamics_;
+  VehicleFactors factors_;
   Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::RowMajor, kMaxModes, 6> Phi_pinv_;
   double period_ = 0.0;  // [s]
   Hold step_;
   State now_, before_;             // before the last step
-  ModalDynamics::Forces damping_;  // in the last step
+  ModalDynamics::Forces damping_;  // in the last step, per mass
   Vec6 offset_ = Vec6::Zero();
 };
 

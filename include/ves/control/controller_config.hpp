@@ -4,6 +4,7 @@
 // program. A plain struct; config/experiment.hpp reads it from YAML.
 #pragma once
 
+#include "ves/contract/order.hpp"
 #include "ves/control/admittance_model.hpp"
 #include "ves/control/force_measurement.hpp"
 #include "ves/control/program.hpp"
@@ -54,15 +55,6 @@ struct GentleMotion {
   double rotation = 0.10;        // [rad/s] peak
   Braking braking = {1.5, 2.5};  // of moves that begin in motion, and before the envelope
 };
-
-/// Whether admittance control with this base, robot and machine decays (analysis/gate.hpp).
-enum class Stability : std::int32_t {
-  kUnknown,   // not checked: refused
-  kStable,    // begins
-  kUnstable,  // refused
-  kForced     // begins, whatever the check said
-};
-inline constexpr std::string_view kStabilityNames[] = {"unknown", "stable", "unstable", "forced"};
 
 /// What the robot has in hand, as the controller is told at a time of the program.
 struct ToldLoad {

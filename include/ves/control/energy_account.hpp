@@ -13,9 +13,17 @@
 // over several ticks, so that the command stays smooth.
 #pragma once
 
+#include <algorithm>
+
 #include "ves/control/port_work.hpp"
 
 namespace ves {
+
+/// [1/s] a tick by which damping that is added grows and fades.
+inline double dampingSlew(double most, double period) noexcept {
+  constexpr double kRise = 0.05;  // [s] from none to all of it
+  return most * std::min(1.0, period / kRise);
+}
 
 class EnergyAccount {
  public:

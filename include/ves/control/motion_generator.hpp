@@ -25,6 +25,11 @@ class MotionGenerator {
   /// Begins a gentle move to the home pose.
   void goHome() noexcept;
 
+  /// `emulated`: the admittance model runs, and goes over to it by and by.
+  void changeVehicle(const VehicleOrder& order, bool emulated) noexcept {
+    admittance_.change(order, emulated);
+  }
+
   /// (C.2) to (C.7): the next state of the base.
   Waypoint<6> admittanceModel(const AdmittanceInput& in, const PathChecks& checks) noexcept;
   /// (C.8) to (C.10), moves and recorded paths.

@@ -4,6 +4,8 @@
 // state diagram is in control/test_platform.hpp.
 #pragma once
 
+#include <optional>
+
 #include "ves/contract/tick_state.hpp"
 #include "ves/control/answers.hpp"
 #include "ves/control/leg_commander.hpp"
@@ -72,6 +74,9 @@ class Supervisor {
   void forgetRehearsal() noexcept;
   void abort(Refusal why, const Situation& now, Actuation act) noexcept;
   Refusal compensate(bool in, const Situation& now, Actuation act) noexcept;
+  Refusal changeVehicle(const Order& order, const Situation& now, Actuation act) noexcept;
+  Refusal refusesLoop(const ControllerConfig& config, bool compensated,
+                      double duration) const noexcept;
   Refusal reset(Actuation act) noexcept;
   Refusal refusesAdmittance(const Segment& segment, const Situation& now,
                             Actuation act) const noexcept;
@@ -90,6 +95,7 @@ class Supervisor {
   bool operator_present_ = false;             // somebody gives orders: hold after what is over
   bool aborted_ = false;                      // the program: a calibration or a start was refused
   Refusal aborted_by_ = Refusal::kNone;       // why, of a start
+  std::optional<VehicleVerdict> changed_;     // of the vehicle, once it is not the configured one
   Answers answers_;
   Order rehearsed_;  // the order whose path is being checked
   Rehearsal rehearsal_;

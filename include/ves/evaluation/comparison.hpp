@@ -92,8 +92,11 @@ class ReferenceMotions {
 std::optional<Motion> baseMotion(const Experiment& experiment, const Vec6& start,
                                  ReferenceMotions& references);
 
+/// Whether the vehicle is the configuration's, which an order may have changed.
+bool ofConfiguredVehicle(const state_t& state) noexcept;
+
 /// The same from where the platform was let go, beside what it did. None of a run without two ticks
-/// of it.
+/// of it, or with another vehicle for a while.
 std::optional<Emulation> emulation(const Series& series, ReferenceMotions& references);
 std::optional<Emulation> emulation(const Series& series);
 
