@@ -83,15 +83,25 @@ class ProgramTime {
   std::int64_t origin_ = 0;  // [ns] start of the segment
 };
 
+/// [-] of the wrench for which a loop is judged: behind a dead band anything from all to nothing.
+std::vector<double> feltShares(const ControllerConfig& controller) {
+  if (controller.wrench_filter.dead_band.isZero(0.0)) return {1.0};
+  return {1.0, 0.8, 0.6, 0.4, 0.2};
+}
+
 /// True when the `change`d loop decays with every robot and in both directions.
 template <class Change>
 bool holds(const ControllerConfig& controller, const RobotTask& task, double growth,
            const std::vector<CarriedRobot>& robots, const Change& change) {
   return std::all_of(std::begin(kBoth), std::end(kBoth), [&](Direction direction) {
-    Loop loop = loopOf(controller, task.initial_joints, direction);
-    loop.allowed_growth = growth;
-    change(loop);
-    return decaysWithAll(loop, robots);
+    const std::vector<double> shares = feltShares(controller);
+    return std::all_of(shares.begin(), shares.end(), [&](double share) {
+      Loop loop = loopOf(controller, task.initial_joints, direction);
+      loop.allowed_growth = growth;
+      loop.felt = share;
+      change(loop);
+      return decaysWithAll(loop, robots);
+    });
   });
 }
 

@@ -49,8 +49,9 @@ Lifted liftedOf(const Loop& loop) {
 }
 
 /// The whole loop over a period, of {eta, eta', six channels, six servo models where the inertia is
-/// taken out, six late wrenches a tick of delay}. With the inertia taken out the modes are those of
-/// the base with the robot on it. `pushed` adds a column, last, of a reading of a force along it.
+/// taken out, six late wrenches a tick of delay, six filtered ones where a low-pass is}. With the
+/// inertia taken out the modes are those of the base with the robot on it. `pushed` adds a column,
+/// last, of a reading of a force along it.
 MatrixXd systemOf(const Loop& loop, const Lifted& lifted, const Vec6* pushed = nullptr,
                   RowVectorXd* first_command = nullptr) {
   const Loop::Model& own = loop.model;
@@ -64,7 +65,9 @@ MatrixXd systemOf(const Loop& loop, const Lifted& lifted, const Vec6* pushed = n
   const MatrixXd& Phi = base.Phi;
   const double T = loop.period;
   const Index channels = 2 * k, models = channels + channel(0).step.rows() + 5 * n,
-              late = models + 6 * m, reading = late + 6 * d, size = reading + (pushed ? 1 : 0);
+              late = models + 6 * m, filtered = late + 6 * d,
+              reading = filtered + (loop.passes.isOnes(0.0) ? 0 : 6),
+              size = reading + (pushed ? 1 : 0);
   const auto startOf = [&](Index i) { return i == 0 ? channels : models - (6 - i) * n; };
   MatrixXd S = MatrixXd::Zero(size, size);
 
@@ -84,8 +87,14 @@ MatrixXd systemOf(const Loop& loop, const Lifted& lifted, const Vec6* pushed = n
     S.middleRows(late, 6) = F;
     for (Index i = 1; i < d; ++i) S.block(late + 6 * i, late + 6 * (i - 1), 6, 6).setIdentity();
     F.setZero();
-    F.middleCols(reading - 6, 6).setIdentity();
+    F.middleCols(filtered - 6, 6).setIdentity();
   }
+  if (reading > filtered) {
+    F = loop.passes.asDiagonal() * F;
+    F.middleCols(filtered, 6).diagonal() = Vec6::Ones() - loop.passes;
+    S.middleRows(filtered, 6) = F;
+  }
+  F *= loop.felt;
 
   // Admittance model.
   const ModalHold hold = modalHold(base, T);
@@ -176,6 +185,7 @@ Loop loopOf(const ControllerConfig& controller, const JointVector& q, Direction 
   loop.sensor_cutoff = own.servo.sensor_cutoff;
   loop.filter_cutoff = own.servo.filter_cutoff;
   loop.readings = own.servo.sensor_readings;
+  loop.passes = controller.wrench_filter.passes(loop.period);
   return loop;
 }
 

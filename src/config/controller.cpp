@@ -63,6 +63,17 @@ Passivity readPassivity(Section& controller) {
   return p;
 }
 
+/// Off without the key.
+WrenchFilterSettings readWrenchFilter(Section& controller) {
+  WrenchFilterSettings f;
+  if (!controller.has("wrench_filter")) return f;
+  Section s = controller.section("wrench_filter");
+  f.dead_band = s.vector("dead_band_n_or_nm", 6, 0.0, 1e6);
+  f.low_pass = s.vector("low_pass_hz", 6, 0.0, 1e4);
+  s.finish();
+  return f;
+}
+
 }  // namespace
 
 void readController(Section s, ControllerConfig& c) {
@@ -84,6 +95,7 @@ void readController(Section s, ControllerConfig& c) {
   c.tare_ramp = s.number("tare_ramp_s", 0.01, 100.0);
   c.compensation = readCompensation(s);
   c.passivity = readPassivity(s);
+  c.wrench_filter = readWrenchFilter(s);
   Section still = s.section("still");
   c.stillness.leg_counts = static_cast<int>(still.integer("leg_counts", 0, 1000));
   c.stillness.joint = still.number("joint_rad_or_m", 0.0, 1.0);

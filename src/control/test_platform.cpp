@@ -16,6 +16,7 @@ TestPlatform::TestPlatform(const ControllerConfig& config)
       bias_(config),
       robot_(config),
       aided_(config),
+      filter_(config.wrench_filter, period_),
       motion_(config),
       safety_(config.safety, config.geometry, period_),
       commander_(config) {}
@@ -42,9 +43,11 @@ const TickState& TestPlatform::tick(const TickInput& in) noexcept {
   W.inertial = robot_.update(known_, elapsed.count, sample.q, X_IP, legs_.feltMotion(), engaged,
                              share_.value());
   const Wrench measured = W.total - W.static_wrench + W.inertial;
-  W.dynamic = aided_.update(
+  W.felt = aided_.update(
       {measured, W.static_wrench, robot_.M_1(), known_, samples_, bias_, X_IP, share_.value()},
       engaged);
+  if (!engaged) filter_.reset();
+  W.dynamic = filter_.update(W.felt);
   safety_.watch(elapsed, samples_, load_.counts());
 
   const Situation now{config_,
@@ -60,7 +63,7 @@ const TickState& TestPlatform::tick(const TickInput& in) noexcept {
   supervisor_.advance(now, act);
 
   const auto proposed = [&] {
-    const Proposal next = inverseKinematics(config_.geometry, nextMotion(W.dynamic));
+    const Proposal next = inverseKinematics(config_.geometry, nextMotion(W));
     return safetyChecks(next, W.dynamic, in.conflicting_node);
   };
   Checked next = proposed();  // (C.11), (C.12)
@@ -74,15 +77,15 @@ const TickState& TestPlatform::tick(const TickInput& in) noexcept {
 }
 
 /// The admittance model (C.2) to (C.7), trajectory generation (C.8) to (C.10), or rest.
-Waypoint<6> TestPlatform::nextMotion(const Wrench& dynamic) noexcept {
+Waypoint<6> TestPlatform::nextMotion(const Wrenches& W) noexcept {
   const Sample& sample = samples_.sample();
   if (supervisor_.stopped()) motion_.hold();
   if (supervisor_.runs(motion_, SegmentKind::kCalibration))
     bias_.calibrate(sample, samples_.fresh(), load_.counts());
   if (supervisor_.runs(motion_, SegmentKind::kAdmittance))
     return motion_.admittanceModel(
-        {dynamic, robot_.M_1(), share_.value(), samples_.wrench(), sample.q, commander_.legs().L,
-         legs_.measured().X_IP, legs_.servo()},
+        {W.dynamic, W.felt, robot_.M_1(), share_.value(), samples_.wrench(), sample.q,
+         commander_.legs().L, legs_.measured().X_IP, legs_.servo()},
         safety_.path());
   if (supervisor_.moves()) return motion_.trajectoryGeneration();
   // Until the legs follow, they are where they are measured.

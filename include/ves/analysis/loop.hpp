@@ -47,6 +47,8 @@ struct Loop {
   double sensor_cutoff = 0.0;    // [rad/s]
   int readings = 1;              // [-] of the A/D converter, averaged over a period
   double late = 0.0;             // [s] by which a wrench is later than anybody knows
+  Vec6 passes = Vec6::Ones();    // [-] of a new wrench that the low-pass lets through in a period
+  double felt = 1.0;             // [-] of the wrench, that a dead band leaves
   int delay = 0;                 // [ticks] that a sample is older than it need be, and says so
   double allowed_growth = 0.0;   // [1/s] that decays() lets pass
   std::optional<Leaning> contact;

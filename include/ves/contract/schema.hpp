@@ -213,7 +213,9 @@ constexpr auto fields(S& s) {
       Field{"withholds", "-", s.withholds,
             "1: what differs from that is withheld as noise, dynamic is reaction"},
       Field{"dynamic", "N, N m", s.dynamic,
-            "total - static_wrench + inertial: input of the admittance model", kWrench, "dynamic"},
+            "total - static_wrench + inertial, behind dead band and low-pass: input of the "
+            "admittance model",
+            kWrench, "dynamic"},
       Field{"x", "m, rad", s.motion.x, "commanded x y z alpha beta gamma from home", kCoordinates,
             "commanded"},
       Field{"x_dot", "m/s, rad/s", s.motion.x_dot, "its rates", kCoordinates, "commanded_rate"},

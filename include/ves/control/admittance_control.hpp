@@ -15,6 +15,7 @@ namespace ves {
 /// What a step of admittance control is made of.
 struct AdmittanceInput {
   const Wrench& F_Po_I;
+  const Wrench& at_port;       // F_Po_I before dead band and low-pass
   const Mat6& M_1;             // of the composite body that is compensated
   double share;                // [-] of the compensation
   const WrenchTiming& wrench;  // when F_Po_I was read

@@ -10,6 +10,7 @@
 #include "ves/control/program.hpp"
 #include "ves/control/safety_checks.hpp"
 #include "ves/control/servo.hpp"
+#include "ves/control/wrench_filter.hpp"
 #include "ves/robot/payload.hpp"
 
 namespace ves {
@@ -90,6 +91,7 @@ struct ControllerConfig : Belief {
   std::int64_t period = 10'000'000;  // [ns]
   Compensation compensation;
   Passivity passivity;
+  WrenchFilterSettings wrench_filter;
   SafetyLimits safety;
   Program program;
   RecordedPath path;                  // of its path segments

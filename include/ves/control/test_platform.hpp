@@ -41,9 +41,11 @@ class TestPlatform {
     Wrench total;          // measured
     Wrench static_wrench;  // of gravity
     Wrench inertial;       // of the robot's composite body, when that is compensated
-    Wrench dynamic;        // total - static_wrench + inertial, minus the residual that is classified as noise
+    Wrench
+        felt;  // total - static_wrench + inertial, minus the residual that is classified as noise
+    Wrench dynamic;  // that, behind dead band and low-pass
   };
-  Waypoint<6> nextMotion(const Wrench& dynamic) noexcept;
+  Waypoint<6> nextMotion(const Wrenches& W) noexcept;
   Checked safetyChecks(const Proposal& next, const Wrench& dynamic, bool conflict) const noexcept;
   void legCommunication(const Checked& next) noexcept;
   const TickState& report(const TickInput& in, const Wrenches& W) noexcept;
@@ -60,6 +62,7 @@ class TestPlatform {
   SensorBias bias_;
   RobotInertia robot_;
   AidedWrench aided_;
+  WrenchFilter filter_;
   MotionGenerator motion_;
   SafetyMonitor safety_;
   Supervisor supervisor_;
