@@ -23,6 +23,7 @@
 #include "ves/analysis/leaning.hpp"
 #include "ves/config/experiment.hpp"
 #include "ves/run/run.hpp"
+#include "ves/series/series.hpp"
 
 namespace ves::app {
 
@@ -110,7 +111,6 @@ inline std::optional<Experiment> scenarioOfLog(const std::string& scenario) {
   if (scenario.empty()) return {};
   return loadExperiment(findScenario(scenario, configFolder()));
 }
-
 /// Which experiment, and on which bus.
 struct Options {
   std::string scenario;
@@ -265,6 +265,14 @@ inline int run(CLI::App& cli, int argc, char** argv, const std::function<int()>&
 
 inline void printDamage(const Damage& damage) {
   for (const std::string& line : damage.lines()) fmt::print(stderr, "warning: {}\n", line);
+}
+
+/// What of it is damaged is said.
+inline Series seriesOf(const std::string& log, const std::string& scenario) {
+  const std::optional<Experiment> without = scenarioOfLog(scenario);
+  Series series = readSeries(log, without ? &*without : nullptr);
+  printDamage(series.damage);
+  return series;
 }
 
 inline void printWarnings(const Experiment& experiment, bool verbose = false) {

@@ -77,10 +77,8 @@ int collectCommand(int argc, char** argv) {
     if (follow == !log.empty() || (follow && mcap.empty()))
       throw InputError("want a log, or --follow with --mcap FILE");
     joinIfNamed(join);
-    const std::optional<Experiment> without = scenarioOfLog(scenario);
-    if (!mcap.empty()) return writeMcap(log, url, mcap, without);
-    const Series series = readSeries(log, without ? &*without : nullptr);
-    printDamage(series.damage);
+    if (!mcap.empty()) return writeMcap(log, url, mcap, scenarioOfLog(scenario));
+    const Series series = seriesOf(log, scenario);
     std::vector<Column> chosen;
     std::vector<bool> used(select.size(), false);
     for (const Column& column : columns(series.experiment))

@@ -77,9 +77,10 @@ int compareCommand(int argc, char** argv) {
       "curves over each other on a page.",
       "ves compare");
   std::vector<std::string> given;
-  std::string html;
+  std::string html, scenario;
   cli.add_option("run", given, "folders of runs, or logs")->required()->expected(2, kMostRuns);
   cli.add_option("--html", html, "a page with the tables and overlaid curves");
+  addScenarioOfLog(cli, scenario);
   return run(cli, argc, argv, [&] {
     std::vector<ComparedRun> runs;
     std::vector<const Experiment*> experiments;
@@ -88,8 +89,7 @@ int compareCommand(int argc, char** argv) {
     ReferenceMotions references;
     for (const std::string& one : given) {
       runs.push_back(
-          {std::filesystem::path(one).lexically_normal().string(), readSeries(logOf(one))});
-      printDamage(runs.back().series.damage);
+          {std::filesystem::path(one).lexically_normal().string(), seriesOf(logOf(one), scenario)});
       header.push_back(runs.back().name);
     }
     for (const ComparedRun& one : runs) {

@@ -7,10 +7,10 @@
 #include "runner.hpp"
 #include "ves/config/masses.hpp"
 #include "ves/config/servo.hpp"
+#include "ves/evaluation/static_intervals.hpp"
 #include "ves/identification/scenario.hpp"
 #include "ves/identification/sensor_timing.hpp"
 #include "ves/identification/servo_identification.hpp"
-#include "ves/evaluation/static_intervals.hpp"
 #include "ves/validation/iterative_compensation.hpp"
 
 namespace ves::app {
@@ -78,9 +78,8 @@ std::vector<StaticInterval> restsIn(const Series& series, const std::string& log
   return rests;
 }
 
-int masses(const std::string& log, const std::string& file) {
-  const Series series = readSeries(log);
-  printDamage(series.damage);
+int masses(const std::string& log, const std::string& scenario, const std::string& file) {
+  const Series series = seriesOf(log, scenario);
   const Experiment& e = series.experiment;
   const std::vector<StaticInterval> rests = restsIn(series, log);
   const StaticSetup setup = staticSetup(e.controller);
@@ -128,9 +127,8 @@ int masses(const std::string& log, const std::string& file) {
 }
 
 /// The servos from any log in which every leg moves both ways.
-int servo(const std::string& log, const std::string& file) {
-  const Series series = readSeries(log);
-  printDamage(series.damage);
+int servo(const std::string& log, const std::string& scenario, const std::string& file) {
+  const Series series = seriesOf(log, scenario);
   const ControllerConfig& c = series.experiment.controller;
   // The longest stretch under command without a gap.
   struct {
@@ -228,7 +226,7 @@ int iterate(Options& load, const IterativeOptions& options, const std::string& f
 int identifyCommand(int argc, char** argv) {
   CLI::App cli("What the machine finds out about itself.", "ves identify");
   cli.require_subcommand(1);
-  std::string name, file;
+  std::string name, file, scenario;
   PosePlanOptions options;
   double tilt = options.tilt / kDegree, speed = 30.0;
   CLI::App* of_plan = cli.add_subcommand(
@@ -252,11 +250,13 @@ int identifyCommand(int argc, char** argv) {
   CLI::App* of_masses = cli.add_subcommand(
       "masses", "mass parameters from a log in which platform and robot stand still in many poses");
   of_masses->add_option("log", name, "LCM event log of a run")->required();
+  addScenarioOfLog(*of_masses, scenario);
   of_masses->add_option("--out", file, "file for --masses of run, demo and controller");
   CLI::App* of_servo = cli.add_subcommand(
       "servo",
       "gains, lag and delay of every leg from a log, of servo_identification for instance");
   of_servo->add_option("log", name, "LCM event log of a run")->required();
+  addScenarioOfLog(*of_servo, scenario);
   of_servo->add_option("--out", file, "file for --servo of run and controller");
   CLI::App* of_path = cli.add_subcommand(
       "iterate",
@@ -288,8 +288,8 @@ int identifyCommand(int argc, char** argv) {
       iterative.rotation = degrees * kDegree;
       return iterate(load, iterative, file);
     }
-    if (of_masses->parsed()) return masses(name, file);
-    if (of_servo->parsed()) return servo(name, file);
+    if (of_masses->parsed()) return masses(name, scenario, file);
+    if (of_servo->parsed()) return servo(name, scenario, file);
     options.tilt = tilt * kDegree;
     return plan(name, options, speed, file);
   });

@@ -41,9 +41,7 @@ int plotCommand(int argc, char** argv) {
   addScenarioOfLog(cli, scenario);
   return run(cli, argc, argv, [&] {
     constexpr std::size_t kMostPanels = 8;
-    const std::optional<Experiment> without = scenarioOfLog(scenario);
-    const Series series = readSeries(log, without ? &*without : nullptr);
-    printDamage(series.damage);
+    const Series series = seriesOf(log, scenario);
     std::vector<bool> used(select.size(), false);
     std::vector<std::pair<std::string, Panel>> panels;  // by unit
     for (const Column& column : columns(series.experiment)) {

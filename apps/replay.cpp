@@ -21,7 +21,9 @@ int replayCommand(int argc, char** argv) {
                "compare every command and state bit for bit; differences: status 1");
   cli.add_option("--speed", options.speed, "times real time; as fast as it goes by default")
       ->check(inRange(1e-3, 1e6));
-  cli.add_option("--with", with, "what would the controller have done with this scenario instead?");
+  cli.add_option(
+      "--with", with,
+      "what would the controller have done with this scenario? Also for a log without one");
   return run(cli, argc, argv, [&] {
     std::optional<Experiment> other;
     if (!with.empty()) {
@@ -40,9 +42,12 @@ int replayCommand(int argc, char** argv) {
       fmt::print("  tick {:>7}  {}{}\n", state.tick, name(phase),
                  phase == Phase::kRunning ? fmt::format(": {}", name(kind)) : "");
     });
-    fmt::print("{}: {} (configuration {}, version {}), {} ticks replayed\n", log, r.name, r.hash,
-               r.version, r.ticks);
-    if (!r.same_arithmetic)
+    if (r.name.empty())
+      fmt::print("{}: without a configuration, {} ticks replayed\n", log, r.ticks);
+    else
+      fmt::print("{}: {} (configuration {}, version {}), {} ticks replayed\n", log, r.name, r.hash,
+                 r.version, r.ticks);
+    if (!r.name.empty() && !r.same_arithmetic)
       fmt::print(
           "this log is of a build with another arithmetic than this one's ({}): the last bit "
           "may differ\n",

@@ -6,8 +6,8 @@
 #include "commands.hpp"
 #include "runner.hpp"
 #include "ves/analysis/appendix_e.hpp"
-#include "ves/analysis/leaning.hpp"
 #include "ves/analysis/gate.hpp"
+#include "ves/analysis/leaning.hpp"
 #include "ves/math/dense.hpp"
 #include "ves/pictures/gnuplot.hpp"
 

@@ -3,18 +3,18 @@
 // ves view: a run in a browser, as it happens or from its log; or a log as one file.
 #include "app.hpp"
 #include "commands.hpp"
-#include "ves/series/series.hpp"
 #include "ves/page/live_run.hpp"
 #include "ves/page/page.hpp"
 #include "ves/page/scene.hpp"
 #include "ves/page/still.hpp"
+#include "ves/series/series.hpp"
 
 namespace ves::app {
 namespace {
 
 struct ViewOptions {
   std::vector<std::string> logs;
-  std::string html, svg;
+  std::string html, svg, scenario;
   MovingOptions moving{0.0, 1e9, 8.0};
   std::optional<double> rate;
   std::string url = kDefaultUrl, join, address = "127.0.0.1";
@@ -25,8 +25,7 @@ struct ViewOptions {
 std::string recordedPage(const ViewOptions& options, double rate) {
   std::vector<nlohmann::ordered_json> recordings;
   for (const std::string& log : options.logs) {
-    const Series series = readSeries(log);
-    printDamage(series.damage);
+    const Series series = seriesOf(log, options.scenario);
     std::vector<std::string> warnings;
     recordings.push_back(recording(series, rate, warnings));
     for (const std::string& warning : warnings) fmt::print(stderr, "warning: {}\n", warning);
@@ -44,8 +43,7 @@ int writePage(const ViewOptions& options) {
 }
 
 int writeMoving(const ViewOptions& options) {
-  const Series series = readSeries(options.logs.front());
-  printDamage(series.damage);
+  const Series series = seriesOf(options.logs.front(), options.scenario);
   MovingOptions how = options.moving;
   how.rate = options.rate.value_or(how.rate);
   const std::string text = moving(series, how);
@@ -115,6 +113,7 @@ int viewCommand(int argc, char** argv) {
   cli.add_option("--rate", options.rate,
                  "[1/s] pictures of a log; 60 in a file, 8 in a drawing, every tick in a browser")
       ->check(inRange(0.1, 1000.0));
+  addScenarioOfLog(cli, options.scenario);
   addUrl(cli, options.url);
   addJoin(cli, options.join);
   cli.add_option("--port", options.port, "8780 by default, or a free one where that is taken")

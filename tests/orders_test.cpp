@@ -229,6 +229,22 @@ TEST(Orders, AreInTheLogAndReplayExactly) {
               replay(without, {}, nullptr);
             }).find("followed order 0, which is not in this log"),
             std::string::npos);
+  // Of a log that began after its configuration was announced, with the same one named.
+  {
+    LogReader reader(log);
+    LogWriter writer(without);
+    LogEvent event;
+    while (reader.next(event))
+      if (event.channel != channel::kExperiment)
+        writer.write(event.channel, event.data.data(), static_cast<std::int64_t>(event.data.size()),
+                     event.time_us * 1000);
+  }
+  EXPECT_NE(test::refusal([&] { replay(without, {}, nullptr); }).find("--with names one"),
+            std::string::npos);
+  const Experiment named = experiment("puma_on_table_4_1");
+  ReplayOptions with;
+  with.with = &named;
+  EXPECT_EQ(replay(without, with, nullptr).different, 0);
   fs::remove(log);
   fs::remove(without);
 }

@@ -62,6 +62,7 @@ class Replayer {
 
   ReplayResult run() {
     OrderedLog reader(log_);
+    if (options_.with) use(*options_.with);
     while (reader.next(event_)) {
       if (event_.channel == channel::kExperiment)
         configure();
@@ -76,7 +77,8 @@ class Replayer {
     }
     if (!platform_)
       throw InputError(
-          fmt::format("{}: no configuration in this log (channel {})", log_, channel::kExperiment));
+          fmt::format("{}: no configuration in this log (channel {}); --with names one", log_,
+                      channel::kExperiment));
     if (result_.ticks == 0)
       throw InputError(fmt::format("{}: no tick of a controller in this log (channel {})", log_,
                                    channel::kState));
@@ -93,17 +95,21 @@ class Replayer {
   }
 
   void configure() {
-    if (platform_) return;  // published again
+    if (configured_) return;  // published again
+    configured_ = true;
     const auto m = decoded<experiment_t>();
     result_.name = m.name;
     result_.hash = m.hash;
     result_.version = m.version;
     result_.same_arithmetic = arithmeticOf(m.version) == build().arithmetic;
     const Experiment recorded = parseExperiment(m.resolved, log_ + ":configuration");
-    const Experiment& used = options_.with ? *options_.with : recorded;
-    result_.stability = used.controller.stability;
-    period_ = used.controller.period;
-    platform_ = std::make_unique<TestPlatform>(used.controller);
+    if (!platform_) use(recorded);
+  }
+
+  void use(const Experiment& experiment) {
+    result_.stability = experiment.controller.stability;
+    period_ = experiment.controller.period;
+    platform_ = std::make_unique<TestPlatform>(experiment.controller);
   }
 
   void keepSample() {
@@ -141,7 +147,7 @@ class Replayer {
   }
 
   void replayTick() {
-    if (!platform_) fail("a tick before any configuration");
+    if (!platform_) fail("a tick before any configuration; --with names one");
     const auto recorded = decoded<state_t>();
     if (result_.ticks == 0) controller_ = recorded.header.source;
     if (recorded.header.source != controller_) return;  // another one on the bus
@@ -226,6 +232,7 @@ class Replayer {
   const ReplayWatch& watch_;
   LogEvent event_;
   std::unique_ptr<TestPlatform> platform_;
+  bool configured_ = false;      // by the log
   std::int64_t controller_ = 0;  // source of the states
   std::int64_t period_ = 0;      // [ns]
   std::int64_t start_ = 0;       // [ns]

@@ -107,9 +107,8 @@ Series readSeries(const std::string& log, const Experiment* without) {
     throw InputError(series.damage.first());
   if (!configured)
     throw InputError(
-        fmt::format("{}: no configuration in this log (channel {}); --scenario names one where "
-                    "a command has it",
-                    log, channel::kExperiment));
+        fmt::format("{}: no configuration in this log (channel {}); --scenario names one", log,
+                    channel::kExperiment));
   return series;
 }
 

@@ -21,7 +21,7 @@ struct Difference {
 };
 
 struct ReplayResult {
-  std::string name, hash, version;  // of the recorded experiment
+  std::string name, hash, version;  // of the recorded experiment; empty: not in the log
   bool same_arithmetic = false;     // this build's; else the last bit may differ
   std::int64_t ticks = 0;           // [-] replayed
   std::int64_t messages = 0;        // [-] states and commands compared
