@@ -61,6 +61,8 @@ TEST(Config, EveryMachineNumberIsTheReportsOrTagged) {
                                         "adaptation",
                                         "wrench",
                                         "filters",
+                                        "dead_band_n_or_nm",
+                                        "low_pass_hz",
                                         "legs",
                                         "force_sensor",
                                         "robot",
