@@ -82,7 +82,7 @@ int robotCommand(int argc, char** argv) {
     }
     printTree(robot, q);
     if (!robot.choice.empty()) fmt::print("\n  {}\n", robot.choice);
-    for (const std::string& warning : robot.warnings) fmt::print("\n  {}\n", warning);
+    for (const std::string& warning : robot.warnings) fmt::print("\n  warning: {}\n", warning);
     return kDone;
   });
 }

@@ -255,6 +255,47 @@ TEST_F(Looks, MeshesOfOtherKindsHaveTheirColours) {
   EXPECT_NE(scene().warnings()[0].find("reaches 3000 m: is it in mm"), std::string::npos);
 }
 
+// Collada says its unit (here a quarter of a metre) and which way is up, which a description says
+// itself; glTF is in metres, its numbers in base64.
+TEST_F(Looks, ColladaAndGltfAreReadAsTheySay) {
+  write("arm/meshes/a.dae", R"(<?xml version="1.0"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><unit name="span" meter="0.25"/><up_axis>Z_UP</up_axis></asset>
+<library_geometries><geometry id="g"><mesh>
+<source id="p"><float_array id="a" count="9">0 0 0 10 0 0 0 20 30</float_array><technique_common>
+<accessor source="#a" count="3" stride="3"><param name="X" type="float"/><param name="Y" type="float"/>
+<param name="Z" type="float"/></accessor></technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<triangles count="1"><input semantic="VERTEX" source="#v" offset="0"/><p>0 1 2</p></triangles>
+</mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="s"><node id="n"><translate>0 0 50</translate>
+<instance_geometry url="#g"/></node></visual_scene></library_visual_scenes>
+<scene><instance_visual_scene url="#s"/></scene></COLLADA>)");
+  write("arm/meshes/a.gltf",
+        R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
+"meshes":[{"primitives":[{"attributes":{"POSITION":0},"material":0}]}],
+"materials":[{"pbrMetallicRoughness":{"baseColorFactor":[0,1,0,1]}}],
+"accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,2,3]}],
+"bufferViews":[{"buffer":0,"byteLength":36}],
+"buffers":[{"byteLength":36,"uri":"data:application/octet-stream;base64,)" +
+            base64({0, 0, 0, 1, 0, 0, 0, 2, 3}) + R"("}]})");
+  const std::string text = test::readText((folder_ / "dressed.urdf").string());
+  const std::string named = "package://arm/meshes/two.stl' scale='0.1 0.1 0.1'";
+  const auto with = [&](const std::string& mesh) {
+    std::string other = text;
+    other.replace(other.find(named), named.size(), mesh);
+    write("dressed.urdf", other);
+    return shapes("mesh", "link2");
+  };
+  const auto collada = with("arm/meshes/a.dae'");
+  ASSERT_EQ(collada.size(), 1u);
+  EXPECT_EQ(collada[0]["triangles"], base64({0, 0, 12.5f, 2.5f, 0, 12.5f, 0, 5, 20}));
+  const auto gltf = with("arm/meshes/a.gltf'");
+  ASSERT_EQ(gltf.size(), 1u);
+  EXPECT_EQ(gltf[0]["triangles"], base64({0, 0, 0, 1, 0, 0, 0, 2, 3}));
+  EXPECT_EQ(gltf[0]["colour"], 0x00ff00);
+}
+
 TEST(Scene, WithoutAnArmThereIsNone) {
   const Scene scene(puma().series.experiment);
   EXPECT_TRUE(scene.description()["arm"].empty());
