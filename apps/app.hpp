@@ -103,6 +103,15 @@ inline std::filesystem::path configFolder() {
   return here || !std::filesystem::exists(installed, error) ? "config" : installed;
 }
 
+/// A run's folder stands for the log in it.
+inline CLI::Option* asLog(CLI::Option* option) {
+  return option->transform([](const std::string& given) {
+    std::error_code error;
+    const std::filesystem::path path(given);
+    return std::filesystem::is_directory(path, error) ? (path / "run.lcmlog").string() : given;
+  });
+}
+
 /// For logs of lcm-logger that began after the configuration was announced.
 inline void addScenarioOfLog(CLI::App& cli, std::string& scenario) {
   cli.add_option("--scenario", scenario, "of a log without a configuration");
@@ -111,6 +120,7 @@ inline std::optional<Experiment> scenarioOfLog(const std::string& scenario) {
   if (scenario.empty()) return {};
   return loadExperiment(findScenario(scenario, configFolder()));
 }
+
 /// Which experiment, and on which bus.
 struct Options {
   std::string scenario;

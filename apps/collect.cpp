@@ -59,7 +59,7 @@ int collectCommand(int argc, char** argv) {
   std::vector<std::string> select;
   bool list = false;
   double rate = 0.0, from = 0.0, duration = HUGE_VAL;
-  cli.add_option("log", log, "LCM event log of a run");
+  asLog(cli.add_option("log", log, "a run's folder, or its LCM event log"));
   cli.add_option("--select", select,
                  "columns, or beginnings of their names: z_ fx_dynamic; all by default");
   cli.add_flag("--list", list, "only the names of the columns, and what they mean");

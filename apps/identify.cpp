@@ -249,13 +249,13 @@ int identifyCommand(int argc, char** argv) {
   of_plan->add_option("--out", file, "scenario file; ves-runs/identify_SCENARIO.yaml by default");
   CLI::App* of_masses = cli.add_subcommand(
       "masses", "mass parameters from a log in which platform and robot stand still in many poses");
-  of_masses->add_option("log", name, "LCM event log of a run")->required();
+  asLog(of_masses->add_option("log", name, "a run's folder, or its LCM event log"))->required();
   addScenarioOfLog(*of_masses, scenario);
   of_masses->add_option("--out", file, "file for --masses of run, demo and controller");
   CLI::App* of_servo = cli.add_subcommand(
       "servo",
       "gains, lag and delay of every leg from a log, of servo_identification for instance");
-  of_servo->add_option("log", name, "LCM event log of a run")->required();
+  asLog(of_servo->add_option("log", name, "a run's folder, or its LCM event log"))->required();
   addScenarioOfLog(*of_servo, scenario);
   of_servo->add_option("--out", file, "file for --servo of run and controller");
   CLI::App* of_path = cli.add_subcommand(

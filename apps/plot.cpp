@@ -32,12 +32,17 @@ int plotCommand(int argc, char** argv) {
   std::string log, scenario, out = "plot.svg";
   std::vector<std::string> select;
   double from = 0.0, duration = HUGE_VAL;
-  cli.add_option("log", log, "LCM event log of a run")->required();
+  asLog(cli.add_option("log", log, "a run's folder, or its LCM event log"))->required();
   cli.add_option("--select", select, "columns, or beginnings of their names (ves collect --list)")
       ->required();
   cli.add_option("--from", from, "[s] since the first tick")->check(inRange(0.0, 1e9));
   cli.add_option("--duration", duration, "[s]; to the end by default")->check(inRange(0.0, 1e9));
-  cli.add_option("--out", out, "SVG file")->capture_default_str();
+  cli.add_option("--out", out, "SVG file")->capture_default_str()->check([](const std::string& to) {
+    const std::string ending = std::filesystem::path(to).extension().string();
+    return ending.empty() || ending == ".svg"
+               ? ""
+               : fmt::format("'{}', want a name that ends in .svg: the picture is one", to);
+  });
   addScenarioOfLog(cli, scenario);
   return run(cli, argc, argv, [&] {
     constexpr std::size_t kMostPanels = 8;

@@ -16,7 +16,8 @@ int replayCommand(int argc, char** argv) {
   std::string log, with;
   bool check = false;
   ReplayOptions options;
-  cli.add_option("log", log, "LCM event log of a run, or of lcm-logger beside one")->required();
+  asLog(cli.add_option("log", log, "a run's folder, its LCM event log, or one of lcm-logger"))
+      ->required();
   cli.add_flag("--check", check,
                "compare every command and state bit for bit; differences: status 1");
   cli.add_option("--speed", options.speed, "times real time; as fast as it goes by default")

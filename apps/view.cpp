@@ -99,7 +99,8 @@ int viewCommand(int argc, char** argv) {
       "arm, and where the base in free space would be. A second log is laid over the first.",
       "ves view");
   ViewOptions options;
-  cli.add_option("log", options.logs, "LCM event logs of one run, or two; none: the run on the bus")
+  asLog(cli.add_option("log", options.logs,
+                       "folders or LCM event logs of one run, or two; none: the run on the bus"))
       ->expected(0, 2);
   auto* html = cli.add_option("--html", options.html,
                               "write one file that a browser opens from disk, and serve nothing");

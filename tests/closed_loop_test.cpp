@@ -409,6 +409,63 @@ TEST_F(ClosedLoop, TheToolIsWhereThePlatformCarriesIt) {
             distance(tool->actual, tool->at_rest).peak);
 }
 
+// What a run says first: how far it was from its base, as a share of how far that goes from rest.
+TEST_F(ClosedLoop, TheEmulationErrorIsToldInSharesOfTheAmplitudeFromRest) {
+  const Series series = run(experiment("free_decay"));
+  const auto summary = summarise(series, result_);
+  // Let go there, at rest, the decay goes no farther: the six are damped far enough.
+  EXPECT_NEAR(summary["emulation_amplitude_m"].get<double>(), std::hypot(0.10, 0.08, 0.06), 2e-4);
+  EXPECT_NEAR(summary["emulation_amplitude_rad"].get<double>(),
+              std::hypot(8.0, 6.0, 10.0) * kDegree, 2e-4);
+  EXPECT_NEAR(summary["emulation_error_position_share"].get<double>(),
+              summary["emulation_error_rms_m"].get<double>() /
+                  summary["emulation_amplitude_m"].get<double>(),
+              1e-12);
+  EXPECT_FALSE(summary.contains("emulation_advice"));
+  const std::string told = table(summary);
+  EXPECT_LT(told.find("emulation off by"), told.find("moved"));
+
+  // The base in free space stands beside it, in the ticks that it is for.
+  const auto e = emulation(series);
+  const std::vector<Column> base = columnsOf(series, *e);
+  ASSERT_EQ(base.size(), 6u);
+  double t = 0.0, most = 0.0;
+  for (const Row& row : series.rows) {
+    const double x = base[0].value(row);
+    if (std::isnan(x)) continue;
+    // Table 4.1 in x: 500 kg, 500 N s/m, 1500 N/m; this tick is of the pose one period on.
+    const double wd = std::sqrt(2.75), end = t;
+    most = std::max(most, std::abs(x - 0.1 * std::exp(-0.5 * end) *
+                                           (std::cos(wd * end) + 0.5 / wd * std::sin(wd * end))));
+    t += 0.01;
+  }
+  EXPECT_NEAR(t, 8.0, 0.02);
+  EXPECT_LT(most, 1e-3);
+}
+
+TEST_F(ClosedLoop, AnEmulationThatIsFarOffSaysWhy) {
+  const Series series = run(experiment("srms_deploy_doss"));
+  const auto summary = summarise(series, result_);
+  EXPECT_GT(summary["emulation_error_position_share"].get<double>(), 0.2);
+  EXPECT_NE(table(summary).find("WARNING: more than 20 % off"), std::string::npos);
+  EXPECT_NE(summary["emulation_advice"].get<std::string>().find("set feed_forward, observer and "
+                                                                "inertia"),
+            std::string::npos);
+}
+
+// Of a pose that is held the error counts too, where the rate is zero.
+TEST_F(ClosedLoop, NoPeakIsBelowItsRms) {
+  const Series series = run(experiment("puma_tilt"));
+  const auto summary = summarise(series, result_);
+  int seen = 0;
+  for (const char* key : {"alpha", "beta"}) {
+    const std::string name = std::string(key) + "_error_";
+    EXPECT_GE(summary[name + "max_rad"].get<double>(), summary[name + "rms_rad"].get<double>());
+    ++seen;
+  }
+  EXPECT_EQ(seen, 2);
+}
+
 TEST_F(ClosedLoop, SwitchStopsTheRunAndLeavesItsName) {
   const Series series = run(experiment(
       "z_sine",

@@ -48,7 +48,7 @@ TEST_F(Programs, BadInputIsOneLineAndStatusTwo) {
   for (const std::string& arguments :
        {std::string("no_such_scenario --lockstep"), std::string("z_sine --fast"),
         std::string("z_sine --lockstep --set legs.tau_s=nan"), std::string("z_sine --seed -4"),
-        std::string("z_sine --seed abc"), std::string(""), std::string("/no/such.yaml --lockstep"),
+        std::string("z_sine --seed abc"), std::string("/no/such.yaml --lockstep"),
         std::string("z_sine --lockstep --out " + blocked), std::string("z_sine --url nonsense"),
         std::string("z_sine --lockstep --set program=[]")}) {
     const Output o = run(arguments);
@@ -57,6 +57,28 @@ TEST_F(Programs, BadInputIsOneLineAndStatusTwo) {
   }
   EXPECT_NE(run("no_such_scenario").text.find("want one of alpha_sine, arm_on_desk"),
             std::string::npos);
+  EXPECT_NE(run("z_sin").text.find("did you mean 'z_sine'?"), std::string::npos);
+}
+
+TEST_F(Programs, RunAloneNamesWhatThereIs) {
+  const Output o = run("");
+  EXPECT_EQ(o.status, 2);
+  for (const auto& entry : fs::directory_iterator(test::configDir() + "/scenarios"))
+    EXPECT_NE(o.text.find("  " + entry.path().stem().string() + " "), std::string::npos)
+        << entry.path();
+}
+
+TEST_F(Programs, AFolderStandsForTheLogInIt) {
+  EXPECT_EQ(run("z_sine --lockstep --no-plots" + out("a")).status, 0);
+  const std::string folder = " '" + (folder_ / "a").string() + "'";
+  const std::string svg = (folder_ / "x.svg").string();
+  EXPECT_EQ(sh(app("replay") + folder + " --check").status, 0);
+  EXPECT_EQ(sh(app("collect") + folder + " --list").status, 0);
+  EXPECT_EQ(sh(app("plot") + folder + " --select z_actual --out " + svg).status, 0);
+  EXPECT_EQ(sh(app("view") + folder + " --svg " + svg + " --from 2 --to 3").status, 0);
+  const Output png = sh(app("plot") + folder + " --select z_actual --out x.png");
+  EXPECT_EQ(png.status, 2);
+  EXPECT_NE(png.text.find("want a name that ends in .svg"), std::string::npos) << png.text;
 }
 
 TEST_F(Programs, HelpIsNoError) {

@@ -11,6 +11,8 @@
 #include <fstream>
 #include <sstream>
 
+#include "spelling.hpp"
+
 namespace ves {
 namespace {
 
@@ -396,6 +398,9 @@ std::filesystem::path findFile(const std::string& kind, const std::string& name,
   for (const auto& entry : std::filesystem::directory_iterator(folder, error))
     if (entry.path().extension() == ".yaml") names.push_back(entry.path().stem().string());
   std::sort(names.begin(), names.end());
+  const std::string meant = nearest(name, names);
+  if (!meant.empty())
+    throw InputError(fmt::format("{} '{}': unknown, did you mean '{}'?", kind, name, meant));
   throw InputError(fmt::format("{} '{}': unknown, want one of {} or a path to a .yaml file", kind,
                                name, fmt::join(names, ", ")));
 }

@@ -193,15 +193,12 @@ std::string Section::onlyKey(const std::vector<std::string_view>& allowed,
 void Section::finish() const {
   for (const std::string& key : value_->keys) {
     if (used_.count(key)) continue;
-    std::string hint;
-    std::size_t best = 1 + key.size() / 3;
-    for (const std::string& known : used_) {
-      if (value_->find(known) || editDistance(key, known) > best) continue;
-      best = editDistance(key, known);
-      hint = fmt::format(", did you mean {}?", known);
-    }
-    if (hint.empty()) hint = fmt::format(", known here: {}", fmt::join(used_, ", "));
-    fail(key, "unknown key" + hint);
+    std::vector<std::string> missing;
+    std::copy_if(used_.begin(), used_.end(), std::back_inserter(missing),
+                 [&](const std::string& known) { return !value_->find(known); });
+    const std::string meant = nearest(key, missing);
+    fail(key, meant.empty() ? fmt::format("unknown key, known here: {}", fmt::join(used_, ", "))
+                            : fmt::format("unknown key, did you mean {}?", meant));
   }
 }
 

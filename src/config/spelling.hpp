@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -23,6 +24,19 @@ inline std::size_t editDistance(std::string_view a, std::string_view b) {
     }
   }
   return row.back();
+}
+
+/// The word that is meant, the last of those alike; empty when none is near.
+template <class Words>
+std::string nearest(std::string_view given, const Words& words) {
+  std::string out;
+  std::size_t best = 1 + given.size() / 3;
+  for (const auto& word : words)
+    if (const std::size_t d = editDistance(given, word); d <= best) {
+      best = d;
+      out = word;
+    }
+  return out;
 }
 
 }  // namespace ves

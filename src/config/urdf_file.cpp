@@ -253,11 +253,9 @@ class Element {
   static std::string_view meant(const std::string& given, const Keys& known) {
     for (const auto& [other, word] : kOtherWords)
       if (given == other && known.count(word)) return word;
-    std::string_view best;
-    std::size_t least = 1 + given.size() / 3;
-    for (const std::string_view word : known)
-      if (const std::size_t d = editDistance(given, word); d <= least) least = d, best = word;
-    return best;
+    const std::string near = nearest(given, known);
+    const auto at = known.find(near);
+    return at == known.end() ? std::string_view() : *at;
   }
   static std::string didYouMean(std::string_view word) {
     return word.empty() ? "" : fmt::format(", did you mean '{}'?", word);

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/evaluation/comparison.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
+#include "ves/core/coordinates.hpp"
 #include "ves/math/dense.hpp"
 #include "ves/srms/modes.hpp"
 
@@ -88,6 +91,15 @@ std::optional<Emulation> emulation(const Series& series) {
   return emulation(series, references);
 }
 
+namespace {
+
+/// What of a pose no mode can express: it stays.
+Vec6 restOf(const ModalModel& base, const Vec6& x) {
+  return x - base.Phi * leastSquares(base.Phi, x);
+}
+
+}  // namespace
+
 std::optional<Motion> baseMotion(const Experiment& e, const Vec6& start,
                                  ReferenceMotions& references) {
   constexpr Eigen::Index kMostModes = 12;
@@ -97,7 +109,7 @@ std::optional<Motion> baseMotion(const Experiment& e, const Vec6& start,
   std::int64_t duration = 0;
   Interaction interaction = interactionOf(e, duration);
   const Eigen::VectorXd eta = leastSquares(interaction.base.Phi, start);
-  interaction.rest = start - interaction.base.Phi * eta;
+  interaction.rest = restOf(interaction.base, start);
   return *references.of(interaction, e.controller.period, duration, eta);
 }
 
@@ -115,6 +127,32 @@ std::optional<Emulation> emulation(const Series& series, ReferenceMotions& refer
   const auto base = baseMotion(series.experiment, commanded(series).x.front(), references);
   if (!base) return {};
   out.base = *base;
+  return out;
+}
+
+Amplitude amplitude(const Experiment& experiment, const Motion& base) {
+  if (base.x.empty()) return {};
+  const Vec6 rest = restOf(experiment.controller.admittance, base.x.front());
+  Amplitude out;
+  for (const Vec6& x : base.x) {
+    out.position = std::max(out.position, (x - rest).head<3>().norm());
+    out.attitude = std::max(out.attitude, (x - rest).tail<3>().norm());
+  }
+  return out;
+}
+
+std::vector<Column> columnsOf(const Series& series, const Emulation& emulation) {
+  const auto at =
+      std::make_shared<const std::map<std::int64_t, Vec6>>(basePoses(series, emulation.base));
+  std::vector<Column> out;
+  for (int i = 0; i < 6; ++i)
+    out.push_back({fmt::format("{}_base_{}", coordinate(i).name, coordinate(i).unit),
+                   [at, i](const Row& row) {
+                     const auto found = at->find(row.state.header.sequence);
+                     return found == at->end() ? NAN : found->second(i);
+                   },
+                   "of the base in free space, let go where the platform was",
+                   {}});
   return out;
 }
 

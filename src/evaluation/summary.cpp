@@ -10,12 +10,12 @@
 #include <utility>
 
 #include "ves/core/coordinates.hpp"
-#include "ves/realtime/latency.hpp"
 #include "ves/evaluation/contact_pairs.hpp"
 #include "ves/evaluation/drift_samples.hpp"
 #include "ves/evaluation/evidence.hpp"
 #include "ves/evaluation/indicators.hpp"
 #include "ves/evaluation/tool_motion.hpp"
+#include "ves/realtime/latency.hpp"
 
 namespace ves {
 namespace {
@@ -38,6 +38,7 @@ bool measured(const Row& row) {
 struct Tracking {
   double low = HUGE_VAL, high = -HUGE_VAL;  // of where it should be
   double rising = 0.0, falling = 0.0;       // largest error with the rate positive, negative
+  double peak = 0.0;                        // and at all
   double sum_e2 = 0.0, sum_ev = 0.0, sum_v2 = 0.0;
   std::int64_t n = 0;
 
@@ -45,6 +46,7 @@ struct Tracking {
     const double e = due - actual;
     low = std::min(low, due);
     high = std::max(high, due);
+    peak = std::max(peak, std::abs(e));
     if (rate > 0.0) rising = std::max(rising, std::abs(e));
     if (rate < 0.0) falling = std::max(falling, std::abs(e));
     sum_e2 += e * e;
@@ -68,7 +70,7 @@ void addTracking(const Series& series, nlohmann::ordered_json& out) {
     if (!(t.high - t.low > kMoved)) continue;
     const std::string name(coordinate(i).name), unit(coordinate(i).unit);
     out[fmt::format("{}_peak_to_peak_{}", name, unit)] = t.high - t.low;
-    out[fmt::format("{}_error_max_{}", name, unit)] = std::max(t.rising, t.falling);
+    out[fmt::format("{}_error_max_{}", name, unit)] = t.peak;
     if (i == 2) {  // all legs extend, or retract, together
       out["z_error_max_extending_m"] = t.rising;
       out["z_error_max_retracting_m"] = t.falling;
@@ -181,25 +183,51 @@ void addDrift(const Series& series, nlohmann::ordered_json& out) {
   }
 }
 
+/// What makes an emulation differ from its base, the likeliest first, and what is to be done.
+std::string adviceOf(const ControllerConfig& c) {
+  if (c.wrench_filter.any())
+    return "the dead band or low-pass of controller.wrench_filter (docs/compensation.md)";
+  if (!c.compensation.feed_forward || !c.compensation.observer || !c.compensation.inertia)
+    return "the servos' lag and the robot's inertia, which are not taken out; set feed_forward, "
+           "observer and inertia of controller.compensation (docs/compensation.md)";
+  if (!c.compensation.aided)
+    return "the sensor's noise (controller.compensation.wrench=aided, docs/compensation.md), or a "
+           "mass "
+           "that is not as believed (--masses FILE, docs/identification.md)";
+  return "a mass or a load that is not as believed (--masses FILE, docs/identification.md)";
+}
+
 /// How far the platform was from the robot on its base in free space.
 void addEmulation(const Series& series, const std::optional<Emulation>& e,
                   nlohmann::ordered_json& out) {
   if (!e) return;
   const Distance error = distance(e->platform, e->base), moved = travel(e->base);
+  const Amplitude most = amplitude(series.experiment, e->base);
+  const auto share = [&](const char* key, double rms, double of) {
+    if (of > kMoved) out[key] = rms / of;
+  };
+  out["emulation_amplitude_m"] = most.position;
+  out["emulation_amplitude_rad"] = most.attitude;
+  share("emulation_error_position_share", error.rms_position, most.position);
+  share("emulation_error_attitude_share", error.rms_attitude, most.attitude);
   out["emulation_travel_m"] = moved.peak_position;
   out["emulation_error_rms_m"] = error.rms_position;
   out["emulation_error_max_m"] = error.peak_position;
   out["emulation_travel_rad"] = moved.peak_attitude;
   out["emulation_error_rms_rad"] = error.rms_attitude;
   out["emulation_error_max_rad"] = error.peak_attitude;
+  const double off = std::max(out.value("emulation_error_position_share", 0.0),
+                              out.value("emulation_error_attitude_share", 0.0));
+  constexpr double kFarOff = 0.2;  // [-] of the amplitude
+  if (off > kFarOff) out["emulation_advice"] = adviceOf(series.experiment.controller);
   const std::optional<ToolMotion> tool = toolMotion(series, e);
   if (!tool) return;
   const ToolDistance carried = distance(tool->actual, tool->at_rest),
-                     off = distance(tool->actual, tool->on_base);
+                     missed = distance(tool->actual, tool->on_base);
   out["tool_displacement_rms_m"] = carried.rms;
   out["tool_displacement_max_m"] = carried.peak;
-  out["tool_error_rms_m"] = off.rms;
-  out["tool_error_max_m"] = off.peak;
+  out["tool_error_rms_m"] = missed.rms;
+  out["tool_error_max_m"] = missed.peak;
 }
 
 /// Of a real-time run: the medians and tails of its times, their histograms, and the missed ticks.

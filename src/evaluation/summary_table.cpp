@@ -41,13 +41,32 @@ std::string table(const nlohmann::ordered_json& s) {
                        cause);
   if (const std::string rejected = s.value("samples_rejected", ""); !rejected.empty())
     out += fmt::format("  {}\n", rejected);
+  if (s.contains("emulation_error_rms_m")) {
+    const auto share = [&](const char* key) {
+      return s.contains(key) ? fmt::format(" ({:.3g} %)", 100.0 * number(key)) : "";
+    };
+    out += fmt::format(
+        "  emulation off by {:.3f} mm{} and {:.4f} deg{} rms, at most {:.3f} mm and {:.4f} deg:\n"
+        "           beside the robot on its base in free space, which goes {:.3f} mm and {:.4f} "
+        "deg "
+        "from rest\n",
+        number("emulation_error_rms_m") * 1e3, share("emulation_error_position_share"),
+        number("emulation_error_rms_rad") / kDegree, share("emulation_error_attitude_share"),
+        number("emulation_error_max_m") * 1e3, number("emulation_error_max_rad") / kDegree,
+        number("emulation_amplitude_m") * 1e3, number("emulation_amplitude_rad") / kDegree);
+    if (s.contains("emulation_advice"))
+      out += fmt::format("           WARNING: more than 20 % off. Likeliest:\n           {}\n",
+                         s["emulation_advice"].get<std::string>());
+  }
   bool head = false;
   for (int i = 0; i < 6; ++i) {
     const std::string c(coordinate(i).name), unit(coordinate(i).unit);
     if (!s.contains(c + "_error_rms_" + unit)) continue;
     if (!std::exchange(head, true))
-      out += fmt::format("\n  {:<8}{:>16}{:>16}{:>16}{:>10}\n", "", "moved", "error, peak",
-                         "error, rms", "lag");
+      out += fmt::format(
+          "\n  where trajectories or admittance control run:\n"
+          "  {:<8}{:>16}{:>16}{:>16}{:>10}\n",
+          "", "moved", "error, peak", "error, rms", "lag");
     const double scale = coordinate(i).shown;
     const std::string_view shown = coordinate(i).shown_unit;
     const auto cell = [&](const std::string& what) {
@@ -63,13 +82,6 @@ std::string table(const nlohmann::ordered_json& s) {
     out += fmt::format("  z error  {:.1f} mm extending, {:.1f} mm retracting\n",
                        number("z_error_max_extending_m") * 1e3,
                        number("z_error_max_retracting_m") * 1e3);
-  if (s.contains("emulation_error_rms_m"))
-    out += fmt::format(
-        "  beside the robot on its base in free space, which moves {:.3f} mm and {:.4f} deg:\n"
-        "           off by {:.3f} mm and {:.4f} deg rms, {:.3f} mm and {:.4f} deg at most\n",
-        number("emulation_travel_m") * 1e3, number("emulation_travel_rad") / kDegree,
-        number("emulation_error_rms_m") * 1e3, number("emulation_error_rms_rad") / kDegree,
-        number("emulation_error_max_m") * 1e3, number("emulation_error_max_rad") / kDegree);
   if (s.contains("tool_error_rms_m"))
     out += fmt::format(
         "  tool     carried {:.3f} mm off by the base ({:.3f} rms); off by {:.3f} mm rms, {:.3f} "

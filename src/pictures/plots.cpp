@@ -199,11 +199,19 @@ std::vector<std::filesystem::path> drawPlots(const Series& series,
 
   Page pose(series, marks, "pose.png", experiment.name + ": pose of the platform, from home",
             program, 2, 3);
+  const std::vector<Column> free =
+      emulation ? columnsOf(series, *emulation) : std::vector<Column>();
   for (int i = 0; i < 6; ++i) {
     const double scale = coordinate(i).shown;
-    pose.panel(fmt::format("{} [{}]", coordinate(i).name, coordinate(i).shown_unit),
-               {{scaled(name(i, "actual"), scale), "actual", kColour[0], false},
-                {scaled(name(i, "desired"), scale), "commanded", kColour[1], true}});
+    std::vector<Curve> curves = {
+        {scaled(name(i, "actual"), scale), "actual", kColour[0], false},
+        {scaled(name(i, "desired"), scale), "commanded", kColour[1], true}};
+    if (emulation)
+      curves.push_back({[value = free[static_cast<std::size_t>(i)].value, scale](const Row& row) {
+                          return value(row) * scale;
+                        },
+                        "base in free space", kColour[2], true});
+    pose.panel(fmt::format("{} [{}]", coordinate(i).name, coordinate(i).shown_unit), curves);
   }
   finish("pose.png", pose);
 

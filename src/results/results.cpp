@@ -9,11 +9,11 @@
 #include <cerrno>
 #include <cstring>
 
-#include "ves/realtime/realtime.hpp"
 #include "ves/evaluation/contact_pairs.hpp"
-#include "ves/pictures/plots.hpp"
 #include "ves/evaluation/summary.hpp"
 #include "ves/evaluation/tool_motion.hpp"
+#include "ves/pictures/plots.hpp"
+#include "ves/realtime/realtime.hpp"
 
 namespace ves {
 
@@ -51,8 +51,11 @@ std::string writeResults(const std::filesystem::path& folder, const RunResult& r
   ReferenceMotions references;
   const std::optional<Emulation> e = emulation(series, references);
   const std::optional<ToolMotion> tool = toolMotion(series, e);
-  writeCsv(series, tool ? columnsOf(*tool) : std::vector<Column>(),
-           (folder / "series.csv").string());
+  std::vector<Column> more;
+  if (e) more = columnsOf(series, *e);
+  if (tool)
+    for (const Column& column : columnsOf(*tool)) more.push_back(column);
+  writeCsv(series, more, (folder / "series.csv").string());
   const auto summary = summarise(series, result, references);
   writeSummary(summary, (folder / "summary.json").string());
   std::string out = table(summary) + "\n";
@@ -67,7 +70,8 @@ std::string writeResults(const std::filesystem::path& folder, const RunResult& r
       files += ", " + plot.filename().string();
   const std::filesystem::path here = folder.lexically_relative(std::filesystem::current_path());
   const bool below = !here.empty() && *here.begin() != "..";
-  return out + fmt::format("  {}\n    {}\n", (below ? here : folder).string(), files);
+  const std::string shown = (below ? here : folder).string();
+  return out + fmt::format("  {}\n    {}\n  see it: ./ves view {}\n", shown, files, shown);
 }
 
 void Progress::show(Phase phase, int segment, std::int64_t tick, const double (&x)[6]) {

@@ -100,6 +100,15 @@ bool ofConfiguredVehicle(const state_t& state) noexcept;
 std::optional<Emulation> emulation(const Series& series, ReferenceMotions& references);
 std::optional<Emulation> emulation(const Series& series);
 
+/// [m], [rad] how far a base goes from where it would rest.
+struct Amplitude {
+  double position = 0.0, attitude = 0.0;
+};
+Amplitude amplitude(const Experiment& experiment, const Motion& base);
+
+/// "x_base_m" and the others: the base in free space, in the tick that each of its points is for.
+std::vector<Column> columnsOf(const Series& series, const Emulation& emulation);
+
 /// Where the base would be, from home [m, rad], by the tick that it is for.
 std::map<std::int64_t, Vec6> basePoses(const Series& series, const Motion& base);
 
