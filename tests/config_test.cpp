@@ -30,6 +30,21 @@ TEST(Config, EveryScenarioLoads) {
   EXPECT_GE(count, 7);
 }
 
+TEST(Config, AScenarioHasNoOtherOnesTitle) {
+  const fs::path file =
+      fs::temp_directory_path() / ("ves_title_" + std::to_string(getpid()) + ".yaml");
+  const std::string from = "from: " + (scenarios() / "puma_on_table_4_1.yaml").string() + "\n";
+  const auto titleOf = [&](const std::string& text) {
+    std::ofstream(file) << from << text;
+    return loadExperiment(file).description;
+  };
+  EXPECT_EQ(titleOf("name: mine\n"), "mine");
+  EXPECT_EQ(titleOf("name: mine\ndescription: My own.\n"), "My own.");
+  EXPECT_EQ(titleOf("seed: 3\n"),
+            loadExperiment(scenarios() / "puma_on_table_4_1.yaml").description);
+  fs::remove(file);
+}
+
 TEST(Config, ResolvedTextReadsBackToTheSameExperiment) {
   for (const auto& entry : fs::directory_iterator(scenarios())) {
     const Experiment e = loadExperiment(entry.path());

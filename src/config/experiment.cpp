@@ -241,6 +241,13 @@ Experiment loadExperiment(const std::filesystem::path& file,
                           const std::filesystem::path& calibration,
                           const std::filesystem::path& masses, const std::filesystem::path& servo) {
   Value document = loadDocument(file);
+  // A title is of the scenario that has the name, and not of one that was built upon.
+  const Value *name = document.find("name"), *title = document.find("description");
+  if (name && title && name->file && title->file && *name->file != *title->file) {
+    Value own = *title;
+    own.text = name->text;
+    document.put("description", own);
+  }
   if (!calibration.empty()) document.put("calibration", loadDocument(calibration));
   if (!masses.empty()) document.put("masses", loadDocument(masses));
   if (!servo.empty()) document.put("servo", loadDocument(servo));
