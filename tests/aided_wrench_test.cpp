@@ -49,24 +49,33 @@ ControllerConfig pendulum(ControllerConfig c) {
 
 double angle(double t) { return kSwing * std::sin(kRate * t); }
 
-/// F_Po_P on the platform, written out: a mass on a circle, and what turns it.
-Vec6 reaction(double t) {
+/// F_Po_P on a platform that turns at w_IP_P, written out: a mass on a circle, and what turns it;
+/// the angular momentum's rate by central differences.
+Vec6 reaction(double t, const Vec3& w) {
   const double q = angle(t), rate = kSwing * kRate * std::cos(kRate * t),
                acceleration = -kRate * kRate * q;
   const Vec3 radial(std::cos(q), std::sin(q), 0.0), tangent(-std::sin(q), std::cos(q), 0.0);
-  const Vec3 f = -kMass * kReach * (acceleration * tangent - rate * rate * radial);
-  const Vec3 n = (kAxle + kReach * radial).cross(f) - kInertia * acceleration * Vec3::UnitZ();
-  return (Vec6() << f, n).finished();
+  const Vec3 p = kAxle + kReach * radial, v = kReach * rate * tangent,
+             a = kReach * (acceleration * tangent - rate * rate * radial);
+  const Vec3 f = -kMass * (a + 2.0 * w.cross(v) + w.cross(w.cross(p)));
+  const auto momentum = [&](double at) -> Vec3 {
+    const Mat3 R = Eigen::AngleAxisd(angle(at), Vec3::UnitZ()).toRotationMatrix();
+    const Mat3 I_P = R * Vec3(0.1, kInertia, kInertia).asDiagonal() * R.transpose();
+    return I_P * (w + kSwing * kRate * std::cos(kRate * at) * Vec3::UnitZ());
+  };
+  constexpr double h = 1e-5;  // [s]
+  const Vec3 turns = (momentum(t + h) - momentum(t - h)) / (2.0 * h) + w.cross(momentum(t));
+  return (Vec6() << f, p.cross(f) - turns).finished();
 }
 
 /// Behind w^2 / (s^2 + sqrt(2) w s + w^2) by small Runge-Kutta steps, averaged over `window` [s] up
 /// to `until`.
-Vec6 filtered(double w, double until, double window) {
-  constexpr double h = 1e-4;
+Vec6 filtered(double w, double until, double window, const Vec3& turning = Vec3::Zero()) {
+  constexpr double h = 4e-4;
   Vec6 y = Vec6::Zero(), v = Vec6::Zero(), sum = Vec6::Zero();
   int n = 0;
   const auto a = [&](double t, const Vec6& y_, const Vec6& v_) -> Vec6 {
-    return w * w * (reaction(t) - y_) - M_SQRT2 * w * v_;
+    return w * w * (reaction(t, turning) - y_) - M_SQRT2 * w * v_;
   };
   for (int k = 0; k * h < until - 0.5 * h; ++k) {
     const double t = k * h;
@@ -82,8 +91,11 @@ Vec6 filtered(double w, double until, double window) {
 }
 
 TEST(JointReaction, IsWhatTheSensorShowsOfALinkThatSwings) {
-  for (const auto& [averaged, late] : {std::pair{false, 0.0}, std::pair{true, 0.0},
-                                       std::pair{false, 0.002}, std::pair{true, 0.002}}) {
+  for (const auto& [averaged, late, turning] :
+       {std::tuple{false, 0.0, Vec3(0.0, 0.0, 0.0)}, std::tuple{true, 0.0, Vec3(0.0, 0.0, 0.0)},
+        std::tuple{false, 0.002, Vec3(0.0, 0.0, 0.0)},
+        std::tuple{true, 0.002, Vec3(0.4, -0.7, 0.5)},
+        std::tuple{false, 0.0, Vec3(0.4, -0.7, 0.5)}}) {
     ControllerConfig c =
         pendulum(config({averaged ? "sensor.readings_per_tick=4" : "sensor.readings_per_tick=1"}));
     c.servo.sensor_delay = late;
@@ -94,9 +106,10 @@ TEST(JointReaction, IsWhatTheSensorShowsOfALinkThatSwings) {
       Sample s;
       s.time = s.wrench_time = s.joints_time = k * kTick;
       s.q(0) = angle(1e-2 * k);
-      const Vec6 F = joints.update(known, s).stacked();
+      const Vec6 F = joints.update(known, s, turning).stacked();
       if (k < 50 || k % 5 != 0) continue;
-      const Vec6 should = filtered(c.servo.sensor_cutoff, 1e-2 * k - late, averaged ? 1e-2 : 0.0);
+      const Vec6 should =
+          filtered(c.servo.sensor_cutoff, 1e-2 * k - late, averaged ? 1e-2 : 0.0, turning);
       most = most.cwiseMax(should.cwiseAbs());
       off = off.cwiseMax((F - should).cwiseAbs());
     }
@@ -116,7 +129,7 @@ TEST(JointReaction, KnowsSamplesThatComeUnevenlyAndAWrenchThatIsOlder) {
     s.time = s.joints_time = k * kTick + jitter(random);
     s.wrench_time = s.joints_time - 4'000'000;
     s.q(0) = angle(1e-9 * static_cast<double>(s.joints_time));
-    const double F = joints.update(known, s).f(1);
+    const double F = joints.update(known, s, Vec3::Zero()).f(1);
     if (k < 50 || k % 10 != 0) continue;
     const double should =
         filtered(c.servo.sensor_cutoff, 1e-9 * static_cast<double>(s.wrench_time), 0.0)(1);
@@ -134,14 +147,14 @@ TEST(JointReaction, JointsThatStandGiveNoneAndAPauseBeginsAnew) {
     Sample s;
     s.wrench_time = s.joints_time = k * kTick;
     s.q(0) = 0.7;
-    EXPECT_EQ(joints.update(known, s).stacked(), Vec6(Vec6::Zero()));
+    EXPECT_EQ(joints.update(known, s, Vec3::Zero()).stacked(), Vec6(Vec6::Zero()));
   }
   joints.reset();
   for (int k = 0; k < 2; ++k) {  // where it was before the pause is no speed
     Sample s;
     s.wrench_time = s.joints_time = (500 + k) * kTick;
     s.q(0) = -0.7 + 0.1 * k;
-    EXPECT_EQ(joints.update(known, s).stacked(), Vec6(Vec6::Zero()));
+    EXPECT_EQ(joints.update(known, s, Vec3::Zero()).stacked(), Vec6(Vec6::Zero()));
   }
 }
 
@@ -158,7 +171,7 @@ TEST(JointReaction, StaysWhereADriverOfTheJointsIsSlowerThanTheTick) {
         s.time = s.wrench_time = k * kTick;
         s.joints_time = k / every * every * kTick;
         s.q(0) = angle(1e-2 * (k / every * every));
-        const double F = joints.update(known, s).f(1);
+        const double F = joints.update(known, s, Vec3::Zero()).f(1);
         if (k < 50) continue;
         const double should = filtered(c.servo.sensor_cutoff, 1e-2 * k, averaged ? 1e-2 : 0.0)(1);
         off = std::max(off, std::abs(F - should));
@@ -177,7 +190,7 @@ TEST(JointReaction, AnglesThatAreOlderBeginAnew) {
     Sample s;
     s.wrench_time = s.joints_time = time * kTick;
     s.q(0) = angle(1e-2 * static_cast<double>(time));
-    EXPECT_TRUE(joints.update(known, s).stacked().allFinite()) << time;
+    EXPECT_TRUE(joints.update(known, s, Vec3::Zero()).stacked().allFinite()) << time;
   }
 }
 
@@ -315,7 +328,7 @@ TEST(AidedWrench, KnowsWhatRoundedLegsMakeOfWeightAndInertia) {
   }
   ASSERT_TRUE(bias.calibrated());
   const Wrench static_wrench = gravityCompensation(c.payload, X_IP.R, F_So_S);
-  aided.update({Wrench{}, static_wrench, M_1, known, samples, bias, X_IP, 1.0}, true);
+  aided.update({Wrench{}, static_wrench, M_1, Vec3::Zero(), known, samples, bias, X_IP, 1.0}, true);
   EXPECT_LT((aided.noise().weight - weight).norm(), 1e-4 * weight.norm());
   EXPECT_LT((aided.noise().legs - legs.cwiseSqrt()).norm(), 1e-4 * legs.cwiseSqrt().norm());
 }
@@ -328,6 +341,39 @@ TEST(AidedWrench, PassesEverythingBeforeACalibration) {
   rig.tick(Request::kStart);
   for (int i = 0; i < 500 && !test::done(rig.state()); ++i) EXPECT_FALSE(rig.tick().withholds);
   EXPECT_EQ(rig.state().phase, Phase::kParked);
+}
+
+// Afloat, nothing touches: when the joints stand again, so does the base, and it is where its mass
+// and the robot's let it be. The sensor's noise makes no difference.
+TEST(AidedWrench, LosesNoMomentumAfloat) {
+  for (const char* noise : {"false", "true"}) {
+    const Experiment e = test::experiment(
+        "puma_on_table_4_1",
+        {kAided[0], kAided[1], kAided[2], kAided[3], "sensor.readings_per_tick=4",
+         std::string("sensor.noise=") + noise, "gravity_m_per_s2=0", "initial_pose={}",
+         "base.mass_diagonal=[500, 500, 500, 120, 120, 120]",
+         "base.damping_diagonal=[0, 0, 0, 0, 0, 0]", "base.stiffness_diagonal=[0, 0, 0, 0, 0, 0]",
+         "program=[{calibration: {}}, {admittance: {duration_s: 9}, robot: ["
+         "{at_s: 1, duration_s: 2, joint: joint_2, to_deg_or_m: -60},"
+         "{at_s: 1.5, duration_s: 2, joint: joint_1, to_deg_or_m: 40},"
+         "{at_s: 5, duration_s: 2, joint: joint_1, to_deg_or_m: -20},"
+         "{at_s: 5.3, duration_s: 2, joint: joint_3, to_deg_or_m: 120}]}]"});
+    test::Rig rig(e);
+    rig.run(20);
+    rig.tick(Request::kStart);
+    double most = 0.0;
+    TickState last;
+    rig.until([&](const TickState& s) {
+      if (s.kind == SegmentKind::kAdmittance && s.phase == Phase::kRunning) {
+        most = std::max(most, s.motion.x_dot.head<3>().norm());
+        last = s;
+      }
+      return test::done(s);
+    });
+    EXPECT_GT(most, 1e-3);
+    EXPECT_LT(last.motion.x_dot.head<3>().norm(), 5e-5) << noise;  // [m/s]
+    EXPECT_LT(last.motion.x_dot.tail<3>().norm(), 5e-4) << noise;
+  }
 }
 
 TEST(LargestFelt, IsTheLagsAloneBehindAQuickFilterAndTheWholeStepOverALongTime) {

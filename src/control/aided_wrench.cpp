@@ -14,11 +14,12 @@ JointReaction::JointReaction(const ControllerConfig& config)
       delay_(config.servo.sensor_delay),
       filter_(config.servo.sensor_cutoff) {}
 
-Wrench JointReaction::update(const KnownPayload& known, const Sample& sample) noexcept {
+Wrench JointReaction::update(const KnownPayload& known, const Sample& sample,
+                             const Vec3& w_IP_P) noexcept {
   if (known_ > 0 && sample.joints_time < last_[2].time) known_ = 0;
   if (known_ > 0 && sample.joints_time == last_[2].time) return newest(sample.wrench_time);
   std::rotate(last_.begin(), last_.begin() + 1, last_.end());
-  last_[2] = {sample.joints_time, sample.q};
+  last_[2] = {sample.joints_time, sample.q, w_IP_P};
   if (known_ < 3 && ++known_ < 3) {
     filter_.settle(Eigen::Array<double, 6, 1>::Zero());
     input_.setZero();
@@ -37,7 +38,7 @@ Wrench JointReaction::update(const KnownPayload& known, const Sample& sample) no
   joints.q_dot = (T_0 * rate_1 + T_1 * rate_0) / (T_0 + T_1);
   joints.q_ddot = 2.0 / (T_0 + T_1) * (rate_1 - rate_0);
   const Vec6 before = input_;
-  input_ = reaction(known, joints);
+  input_ = reaction(known, joints, last_[1].w_IP_P);
   rate_ = (input_ - before) / T_0;
   filter_.advance(filter_.prepare(T_0), input_.array());
   return newest(sample.wrench_time);
@@ -60,10 +61,15 @@ Wrench JointReaction::newest(std::int64_t time) const noexcept {
   return Wrench::from(0.5 * (y_0 + y_1) - delay_ / std::min(ahead, window_) * (y_1 - y_0));
 }
 
-/// F_Po_P on the platform.
-Vec6 JointReaction::reaction(const KnownPayload& known, const JointState& joints) noexcept {
-  const Wrench on_robot = newtonEuler(known.carried(), joints, {}).F_L0o_L0;
-  return -transfer(known.payload().X_PL0(), on_robot).stacked();
+/// F_Po_P on the platform. What it takes to accelerate the locked robot is RobotInertia's.
+Vec6 JointReaction::reaction(const KnownPayload& known, const JointState& joints,
+                             const Vec3& w_IP_P) noexcept {
+  BodyMotion P;
+  P.w = w_IP_P;
+  const Transform X_PL0 = known.payload().X_PL0();
+  const Wrench on_robot =
+      newtonEuler(known.carried(), joints, properMotion(P, X_PL0, Vec3::Zero())).F_L0o_L0;
+  return -transfer(X_PL0, on_robot).stacked();
 }
 
 double largestFelt(const ServoModel& servo, double period, std::size_t samples) {
@@ -147,7 +153,8 @@ Wrench AidedWrench::update(const Input& in, bool engaged) noexcept {
     withholds_ = false;
     return in.measured;
   }
-  if (in.samples.fresh()) F_Po_P_ = joints_.update(in.known, in.samples.sample());
+  if (in.samples.fresh())
+    F_Po_P_ = joints_.update(in.known, in.samples.sample(), in.X_IP.R.transpose() * in.w_IP_I);
   reaction_ = rotate(in.X_IP.R, F_Po_P_);
   const Wrench residual = in.measured - reaction_;
   if (!in.bias.calibrated()) return in.measured;

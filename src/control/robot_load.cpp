@@ -71,6 +71,7 @@ Wrench RobotInertia::update(const KnownPayload& known, std::int64_t count, const
                             double share) noexcept {
   if (!compensated_ || !engaged) {
     known_ = false;
+    w_IP_I_.setZero();
     return {};
   }
   if (!known_ || count % mass_update_ == 0 || known.changed())
@@ -79,6 +80,7 @@ Wrench RobotInertia::update(const KnownPayload& known, std::int64_t count, const
   M_1_ = share * scale_ * spatialMass(rotated(X_IP.R, composite_P_));
   BodyMotion P;
   if (!forwardMotion(geometry_, X_IP, legs, P)) return {};
+  w_IP_I_ = P.w;
   Vec6 acceleration;
   acceleration << P.a, P.alpha;
   return Wrench::from(M_1_ * acceleration);

@@ -43,9 +43,9 @@ const TickState& TestPlatform::tick(const TickInput& in) noexcept {
   W.inertial = robot_.update(known_, elapsed.count, sample.q, X_IP, legs_.feltMotion(), engaged,
                              share_.value());
   const Wrench measured = W.total - W.static_wrench + W.inertial;
-  W.felt = aided_.update(
-      {measured, W.static_wrench, robot_.M_1(), known_, samples_, bias_, X_IP, share_.value()},
-      engaged);
+  W.felt = aided_.update({measured, W.static_wrench, robot_.M_1(), robot_.w_IP_I(), known_,
+                          samples_, bias_, X_IP, share_.value()},
+                         engaged);
   if (!engaged) filter_.reset();
   W.dynamic = filter_.update(W.felt);
   safety_.watch(elapsed, samples_, load_.counts());

@@ -9,28 +9,31 @@
 
 namespace ves {
 
-/// The wrench of the robot's joints in motion, its base at rest, behind the sensor's filter and
-/// mean: Newton-Euler (Appendix A) with rates and accelerations by divided differences of the last
-/// three angles. These hold where the middle one was read; from there the wrench is extrapolated
-/// along a line to where the newest sample was taken.
+/// The wrench of the robot's joints in motion, on a base that turns but does not accelerate, behind
+/// the sensor's filter and mean: Newton-Euler (Appendix A) with rates and accelerations by divided
+/// differences of the last three angles. These hold where the middle one was read; from there the
+/// wrench is extrapolated along a line to where the newest sample was taken.
 class JointReaction {
  public:
   explicit JointReaction(const ControllerConfig& config);
 
   /// Nothing is known of the past.
   void reset() noexcept { known_ = 0; }
-  /// A new sample. F_Po_P as its wrench shows it; zero until three angles have come. A driver of
-  /// the joints may be slower than the tick: then the last angles still hold.
-  Wrench update(const KnownPayload& known, const Sample& sample) noexcept;
+  /// A new sample, taken while the platform turned at w_IP_P. F_Po_P as its wrench shows it; zero
+  /// until three angles have come. A driver of the joints may be slower than the tick: then the
+  /// last angles still hold.
+  Wrench update(const KnownPayload& known, const Sample& sample, const Vec3& w_IP_P) noexcept;
 
  private:
   struct Angles {
     std::int64_t time = 0;  // [ns]
     JointVector q = JointVector::Zero();
+    Vec3 w_IP_P = Vec3::Zero();  // [rad/s] of the platform then
   };
   /// Brought to `time` [ns]; zero while too little is known.
   Wrench newest(std::int64_t time) const noexcept;
-  static Vec6 reaction(const KnownPayload& known, const JointState& joints) noexcept;
+  static Vec6 reaction(const KnownPayload& known, const JointState& joints,
+                       const Vec3& w_IP_P) noexcept;
 
   double window_, delay_;  // [s] of the sensor, ServoModel
   Butterworth2<6> filter_;
@@ -85,6 +88,7 @@ class AidedWrench {
     const Wrench& measured;  // F_Po_I that the sensor shows beyond weight and inertia
     const Wrench& weight;    // F_Po_I
     const Mat6& M_1;         // RobotInertia
+    const Vec3& w_IP_I;      // [rad/s] of the platform, when the newest sample was taken
     const KnownPayload& known;
     const SampleStream& samples;
     const SensorBias& bias;

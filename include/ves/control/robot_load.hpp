@@ -78,6 +78,8 @@ class RobotInertia {
 
   /// Of the composite body about Po in I, times the share. [kg, kg m, kg m^2]
   const Mat6& M_1() const noexcept { return M_1_; }
+  /// Of the platform, when the newest sample was taken; zero where it is not looked at.
+  const Vec3& w_IP_I() const noexcept { return w_IP_I_; }  // [rad/s]
 
  private:
   bool compensated_;
@@ -87,6 +89,7 @@ class RobotInertia {
   RigidBody composite_P_;
   bool known_ = false;  // composite_P_, since the legs were engaged
   Mat6 M_1_ = Mat6::Zero();
+  Vec3 w_IP_I_ = Vec3::Zero();
 };
 
 }  // namespace ves

@@ -53,8 +53,8 @@ class SampleStream {
   explicit SampleStream(std::int64_t period) : period_(period) {}  // [ns]
 
   /// While the legs follow, a sample with a lower sequence than the last is ignored; before that, a
-  /// machine may start over. A sample with an unchanged time is not new. `now` [ns] of the machine's
-  /// clock.
+  /// machine may start over. A sample with an unchanged time is not new. `now` [ns] of the
+  /// machine's clock.
   void update(const Sample& newest, std::int64_t now, bool engaged, bool conflict) noexcept {
     const Sample before = sample_;
     if (!(engaged && newest.sequence < before.sequence)) sample_ = newest;
