@@ -30,6 +30,23 @@ TEST(Config, EveryScenarioLoads) {
   EXPECT_GE(count, 7);
 }
 
+// Else a controller of 1 kHz would find no new sample in half of its ticks, and never arm.
+TEST(Config, AMachineSamplesTwiceInEveryTick) {
+  const auto of = [](const char* period) {
+    return test::experiment("z_sine", {std::string("controller.period_ns=") + period})
+        .machine.period;
+  };
+  EXPECT_EQ(of("10000000"), 2'000'000);
+  EXPECT_EQ(of("1000000"), 500'000);
+}
+
+TEST(Config, ABeginningIsMeantRatherThanAnotherWord) {
+  EXPECT_NE(refusal([] {
+              loadExperiment(scenarios() / "z_sine.yaml", {"gravity=0"});
+            }).find("did you mean gravity_m_per_s2?"),
+            std::string::npos);
+}
+
 TEST(Config, AScenarioHasNoOtherOnesTitle) {
   const fs::path file =
       fs::temp_directory_path() / ("ves_title_" + std::to_string(getpid()) + ".yaml");

@@ -105,6 +105,33 @@ TEST(Scene, TheBaseIsThereInAdmittanceControlOnly) {
               run.series.experiment.plant.geometry.home_height + 0.25, 1e-6);
 }
 
+// Before its calibration the wrench is the sensor's bias, hundreds of newtons of nothing.
+TEST(Scene, TheForceIsShownOnceTheSensorsBiasIsKnown) {
+  const RecordedRun run = puma();
+  const Scene scene(run.series.experiment);
+  const auto d = scene.description();
+  std::size_t at = 7 * d["frames"].size() + 3 * d["arm"].size();
+  for (const auto& one : d["scalars"]) {
+    if (one == "fz_dynamic") break;
+    ++at;
+  }
+  int hidden = 0, known = 0;
+  for (const Row& row : run.series.rows) {
+    const float fz = scene.picture(row, {})[at];
+    if (row.state.calibration == static_cast<int>(CalibrationStatus::kDone) &&
+        row.state.kind != static_cast<int>(SegmentKind::kCalibration)) {
+      ASSERT_LT(std::abs(fz), 40.0f);  // the weight is 180 N
+      ASSERT_EQ(fz, static_cast<float>(row.state.dynamic[2]));
+      ++known;
+    } else {
+      ASSERT_TRUE(std::isnan(fz));
+      ++hidden;
+    }
+  }
+  EXPECT_GT(hidden, 100);
+  EXPECT_GT(known, 200);
+}
+
 TEST(Scene, TheArmEndsInThePlatformAndStandsAtItsRoot) {
   // Small displacements that the modes express: the arm's tip goes where the platform does.
   const Experiment e = test::experiment("srms_low_hover_puma");
@@ -515,6 +542,10 @@ class Live : public testing::Test {
     }
     ASSERT_TRUE(done());
   }
+  std::string newestPicture() const {
+    std::int64_t number = 0;
+    return live.pictures(live.newest() - 1, number);
+  }
   double scalar(const char* name) {
     const auto scene = nlohmann::json::parse(live.scene());
     const auto& d = scene["scene"];
@@ -523,7 +554,7 @@ class Live : public testing::Test {
       if (one == name) break;
       ++at;
     }
-    const std::string bytes = live.picture();
+    const std::string bytes = newestPicture();
     EXPECT_EQ(bytes.size(), 24 + 4 * scene["width"].get<std::size_t>());
     float value = NAN;
     std::memcpy(&value, bytes.data() + 24 + 4 * at, sizeof value);
@@ -543,7 +574,7 @@ class Live : public testing::Test {
 TEST_F(Live, WhoJoinsLateAsksForTheConfigurationAndHasTheSameTime) {
   until(9, 100, true, [&] { return queries > 0; });
   EXPECT_EQ(live.edition(), 0);
-  EXPECT_TRUE(live.picture().empty());
+  EXPECT_TRUE(newestPicture().empty());
   describe(8, 100);  // somebody else's
   until(9, 100, true, [&] { return queries > 1; });
   EXPECT_EQ(live.edition(), 0);
@@ -559,11 +590,47 @@ TEST_F(Live, WhoJoinsLateAsksForTheConfigurationAndHasTheSameTime) {
   EXPECT_GT(scalar("t_s"), 6.9);
 }
 
+// Whoever draws seldom gets every sample that was heard, in messages of bounded size.
+TEST_F(Live, NoSampleIsLeftOutBetweenTwoPictures) {
+  describe(9, 100);
+  until(9, 100, true, [&] { return live.edition() == 1 && live.newest() > 0; });
+  std::int64_t got = live.newest();
+  const std::int64_t from = got;
+  for (int i = 0; i < 1300; ++i) {
+    tell(9, 100, tick++, true);
+    if (i % 20 == 0) live.listen();
+  }
+  until(9, 100, true, [&] { return live.newest() >= from + 1300; });
+  const auto scene = nlohmann::json::parse(live.scene());
+  const std::size_t width = 4 * scene["width"].get<std::size_t>(),
+                    at_time = 4 * (7 * scene["scene"]["frames"].size() +
+                                   3 * scene["scene"]["arm"].size());
+  std::vector<float> times;
+  std::size_t messages = 0;
+  for (std::string bytes; !(bytes = live.pictures(got, got)).empty(); ++messages) {
+    ASSERT_EQ((bytes.size() - 24) % width, 0u);
+    double number = 0.0;
+    std::memcpy(&number, bytes.data(), sizeof number);
+    EXPECT_EQ(number, static_cast<double>(got));
+    const std::size_t before = times.size();
+    for (std::size_t at = 24; at < bytes.size(); at += width) {
+      float t = NAN;
+      std::memcpy(&t, bytes.data() + at + at_time, sizeof t);
+      times.push_back(t);
+    }
+    EXPECT_LE(times.size() - before, 500u);
+  }
+  EXPECT_EQ(got, live.newest());
+  EXPECT_GE(messages, 3u);
+  ASSERT_EQ(static_cast<std::int64_t>(times.size()), live.newest() - from);
+  for (std::size_t i = 1; i < times.size(); ++i) ASSERT_NEAR(times[i] - times[i - 1], 0.01, 1e-4);
+}
+
 TEST_F(Live, TheBaseIsShownToWhoSawItLetGo) {
   const int admittance = admittanceSegment(test::experiment("free_decay").controller.program);
   const auto base = [&] {  // the second frame
     float x = NAN;
-    std::memcpy(&x, live.picture().data() + 24 + 4 * 7, sizeof x);
+    std::memcpy(&x, newestPicture().data() + 24 + 4 * 7, sizeof x);
     return x;
   };
   describe(9, 100);

@@ -102,7 +102,7 @@ Experiment build(const Value& document) {
   const WorkspaceUse use = readWorkspace(root.section("safety"), c.geometry);
   const Legs legs = readLegs(leg_section, use);
   c.legs = legs.codec;
-  out.machine = readMachine(root.section("machine"));
+  out.machine = readMachine(root.section("machine"), c.period);
   if (root.has("bus")) {
     Section bus = root.section("bus");
     out.key_file = bus.text("key_file");

@@ -213,7 +213,7 @@ ForceSensorSource readForceSensor(Section& machine) {
 
 }  // namespace
 
-MachinePieces readMachine(Section s) {
+MachinePieces readMachine(Section s, std::int64_t controller_period) {
   MachinePieces m;
   const auto external = [&](const char* key) {
     return s.choice(key, {"simulated", "external"}) == "external";
@@ -222,7 +222,8 @@ MachinePieces readMachine(Section s) {
   m.external_robot = external("robot");
   m.external_switches = external("switches");
   m.force_sensor = readForceSensor(s);
-  m.period = s.integer("sample_period_ns", 200'000, 100'000'000);
+  // A quick controller finds a new sample in every tick, whenever in it it wakes.
+  m.period = std::min(s.integer("sample_period_ns", 200'000, 100'000'000), controller_period / 2);
   m.follow = s.number("follow_per_s", 1.0, 1e4);
   s.finish();
   return m;

@@ -81,7 +81,7 @@ void readController(Section s, ControllerConfig& c);
 void readProgram(Section& root, Experiment& out);
 
 /// machine
-MachinePieces readMachine(Section s);
+MachinePieces readMachine(Section s, std::int64_t controller_period);
 
 /// plant_mismatch
 void readPlantMismatch(Section s, plant::PlantConfig& p);

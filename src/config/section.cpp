@@ -196,7 +196,8 @@ void Section::finish() const {
     std::vector<std::string> missing;
     std::copy_if(used_.begin(), used_.end(), std::back_inserter(missing),
                  [&](const std::string& known) { return !value_->find(known); });
-    const std::string meant = nearest(key, missing);
+    std::string meant = beginning(key, used_);
+    if (meant.empty()) meant = nearest(key, missing);
     fail(key, meant.empty() ? fmt::format("unknown key, known here: {}", fmt::join(used_, ", "))
                             : fmt::format("unknown key, did you mean {}?", meant));
   }

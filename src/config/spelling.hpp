@@ -26,10 +26,22 @@ inline std::size_t editDistance(std::string_view a, std::string_view b) {
   return row.back();
 }
 
-/// The word that is meant, the last of those alike; empty when none is near.
+/// A word that begins so; empty when none does.
+template <class Words>
+std::string beginning(std::string_view given, const Words& words) {
+  constexpr std::size_t kTelling = 4;  // [-] letters
+  for (const auto& word : words)
+    if (given.size() >= kTelling && std::string_view(word).substr(0, given.size()) == given)
+      return std::string(word);
+  return {};
+}
+
+/// The word that is meant: one that begins so, or the nearest, the last of those alike; empty when
+/// none is near.
 template <class Words>
 std::string nearest(std::string_view given, const Words& words) {
-  std::string out;
+  std::string out = beginning(given, words);
+  if (!out.empty()) return out;
   std::size_t best = 1 + given.size() / 3;
   for (const auto& word : words)
     if (const std::size_t d = editDistance(given, word); d <= best) {

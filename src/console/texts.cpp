@@ -24,11 +24,11 @@ std::string statusText(const Status& status) {
   const auto kind = static_cast<SegmentKind>(s.kind);
   std::string out = fmt::format(
       "  phase      {}{}\n  commanded  {}\n  measured   {}\n"
-      "  wrench     {:+.2f} {:+.2f} {:+.2f} N   {:+.3f} {:+.3f} {:+.3f} N m, gravity taken out\n",
+      "  wrench     {:+.2f} {:+.2f} {:+.2f} N   {:+.3f} {:+.3f} {:+.3f} N m, gravity taken out{}\n",
       name(static_cast<Phase>(s.phase)),
       kind == SegmentKind::kCount ? "" : fmt::format(", {}", name(kind)), poseText(s.x),
       poseText(s.x_measured), s.dynamic[0], s.dynamic[1], s.dynamic[2], s.dynamic[3], s.dynamic[4],
-      s.dynamic[5]);
+      s.dynamic[5], status.calibration ? "" : ", the sensor's bias in it");
   if (status.calibration) {
     const CalibrationRecord& record = *status.calibration;
     out += fmt::format("  bias       of {}, {:.1f} h old, at {:.1f} C; now {:.1f} C{}\n",

@@ -3,7 +3,8 @@
 
 #include <fmt/format.h>
 
-#include <cstring>
+#include <algorithm>
+#include <utility>
 
 #include "ves/bus/channels.hpp"
 #include "ves/realtime/realtime.hpp"
@@ -54,6 +55,7 @@ bool LiveRun::follow(const state_t& state) {
   state_.reset();
   rows_ = {};
   row_.reset();
+  pictures_.clear();
   experiment_.reset();
   scene_.reset();
   base_.reset();
@@ -81,6 +83,7 @@ void LiveRun::takeState(const state_t& state) {
   row_->t = static_cast<double>(row_->state.header.sequence * experiment_->controller.period) *
             kSecondPerNanosecond;
   ++newest_;
+  keepPicture();
 }
 
 void LiveRun::takeExperiment(const experiment_t& experiment) {
@@ -168,18 +171,34 @@ void LiveRun::requestStop(std::int64_t edition) {
   remind();
 }
 
-std::string LiveRun::picture() const {
-  if (!row_ || !scene_) return {};
+void LiveRun::keepPicture() {
+  constexpr std::size_t kKept = 6000;  // [-] a minute at 100 Hz
   std::optional<Vec6> base;
   if (base_) base = base_->point(row_->state.header.sequence - let_go_->tick);
-  std::vector<float> numbers = scene_->picture(*row_, base);
-  numbers.push_back(static_cast<float>(rate_));
-  numbers.push_back(!stop_ ? 0.0f : stop_->taken ? 2.0f : 1.0f);
-  const double head[] = {static_cast<double>(newest_),
-                         static_cast<double>(row_->state.header.time_ns), rate_};
-  std::string out(sizeof head + numbers.size() * sizeof(float), '\0');
-  std::memcpy(out.data(), head, sizeof head);
-  std::memcpy(out.data() + sizeof head, numbers.data(), numbers.size() * sizeof(float));
+  Picture one{newest_, row_->state.header.time_ns, rate_, scene_->picture(*row_, base)};
+  one.numbers.push_back(static_cast<float>(rate_));
+  one.numbers.push_back(!stop_ ? 0.0f : stop_->taken ? 2.0f : 1.0f);
+  pictures_.push_back(std::move(one));
+  if (pictures_.size() > kKept) pictures_.pop_front();
+}
+
+std::string LiveRun::pictures(std::int64_t after, std::int64_t& last) const {
+  constexpr std::int64_t kMost = 500;  // [-] in a message
+  if (pictures_.empty()) return {};
+  const std::int64_t oldest = pictures_.front().number, newest = pictures_.back().number;
+  if (after >= newest) return {};
+  const std::int64_t first = std::max(after + 1, oldest);
+  last = std::min(newest, first + kMost - 1);
+  const auto at = [&](std::int64_t number) -> const Picture& {
+    return pictures_[static_cast<std::size_t>(number - oldest)];
+  };
+  const double head[] = {static_cast<double>(last), static_cast<double>(at(last).time),
+                         at(last).rate};
+  std::string out(reinterpret_cast<const char*>(head), sizeof head);
+  for (std::int64_t number = first; number <= last; ++number) {
+    const std::vector<float>& numbers = at(number).numbers;
+    out.append(reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(float));
+  }
   return out;
 }
 

@@ -391,7 +391,7 @@
     if (event.key === 'ArrowRight') { play(false); show(shown + 1); }
   });
 
-  /** The run on the bus: the newest picture, and the last minute of what was drawn. */
+  /** The run on the bus: the newest picture, and every sample of the last minute. */
   class Live {
     constructor() {
       this.edition = 0;
@@ -430,13 +430,16 @@
     draw(now) {
       if (!this.waiting) return;
       this.head = Array.from(new Float64Array(this.waiting, 0, 3));
-      const picture = new Float32Array(this.waiting, 24);
+      const numbers = new Float32Array(this.waiting, 24);
       this.waiting = null;
       this.send('drawn');
-      if (picture.length !== first.width) return;
-      first.pictures.push(picture);
-      markOf(first.count - 1);
-      for (const c of charts) c.rows.push(c.row(first.count - 1));
+      if (!numbers.length || numbers.length % first.width) return;
+      // All that have come since the one before: the scene shows the last, the curves have each.
+      for (let from = 0; from < numbers.length; from += first.width) {
+        first.pictures.push(numbers.slice(from, from + first.width));
+        markOf(first.count - 1);
+        for (const c of charts) c.rows.push(c.row(first.count - 1));
+      }
       while (first.time(0) < first.time(first.count - 1) - KEPT) {
         first.pictures.shift();
         for (const c of charts) c.rows.shift();
@@ -457,6 +460,7 @@
     get words() { return element('words').textContent; },
     show,
     time: () => first.time(shown),
+    charted: () => charts.length ? charts[0].rows.map(row => row[0]) : [],
     position: name => {
       world.updateMatrixWorld(true);
       return new THREE.Vector3().setFromMatrixPosition(bodies[0].frames[name].matrixWorld).toArray();

@@ -139,9 +139,19 @@ Scene::Scene(const Experiment& e)
   for (int i = 0; i < 6; ++i)
     scalars_.push_back({fmt::format("{}_actual", coordinate(i).name),
                         [i](const Row& r) { return r.hasTruePose() ? r.truth.x[i] : NAN; }});
+  // Before the calibration that is to come it is the sensor's bias, as large as the robot's weight.
+  const Program& program = e.controller.program;
+  const bool waits =
+      std::any_of(program.segments.begin(), program.segments.begin() + program.size,
+                  [](const Segment& s) { return s.kind == SegmentKind::kCalibration; });
   for (int i = 0; i < 6; ++i)
-    scalars_.push_back({fmt::format("{}_dynamic", wrenchComponent(i).name),
-                        [i](const Row& r) { return r.state.dynamic[i]; }});
+    scalars_.push_back(
+        {fmt::format("{}_dynamic", wrenchComponent(i).name), [i, waits](const Row& r) {
+           const bool known = r.state.kind != static_cast<int>(SegmentKind::kCalibration) &&
+                              (r.state.calibration == static_cast<int>(CalibrationStatus::kDone) ||
+                               !Vec6::Map(r.state.bias).isZero(0.0));
+           return known || !waits ? r.state.dynamic[i] : NAN;
+         }});
   for (int i = 0; i < kLegs; ++i)
     scalars_.push_back({fmt::format("leg{}_error_m", i + 1),
                         [i](const Row& r) { return r.state.leg[i] - r.state.leg_measured[i]; }});

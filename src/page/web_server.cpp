@@ -294,15 +294,15 @@ class WebServer::Impl {
     Page& page = pages_[wsi];
     if (!wants(page)) return 0;
     const bool scene = page.edition != live_->edition();
-    const std::string what = scene ? live_->scene() : live_->picture();
-    if (scene) {
+    std::int64_t last = live_->newest();
+    const std::string what = scene ? live_->scene() : live_->pictures(page.picture, last);
+    page.picture = last;  // of a new scene one comes next
+    if (scene)
       page.edition = live_->edition();
-      page.picture = live_->newest();  // one of this scene comes next
-    } else {
-      page.picture = live_->newest();
-      if (what.empty()) return 0;
+    else if (what.empty())
+      return 0;
+    else
       page.drawn = false;
-    }
     std::vector<unsigned char> buffer(LWS_PRE + what.size());
     std::memcpy(buffer.data() + LWS_PRE, what.data(), what.size());
     if (lws_write(wsi, buffer.data() + LWS_PRE, what.size(),

@@ -30,8 +30,12 @@ class Live(support.Page):
             self.until(f"ves.time() > {t}")
             seen.append(self.ask("[ves.time(), ves.live.head[2]].concat(arguments[0].map(ves.matrix))", names))
             self.shot(f"live_{t:.0f}")
+        charted = np.array(self.ask("ves.charted()"))
         self.assertEqual(support.errors(self.browser), [])
         self.assertEqual(run.wait(), 0, run.said)
+        # Every sample of the run, however seldom it was drawn.
+        self.assertGreater(charted[-1] - charted[0], 5.0)
+        self.assertLess(np.abs(np.diff(charted) - PERIOD).max(), 1e-4)
         ticks = support.rows(run.out, "tick")
         for t, rate, *matrices in seen:
             due = support.poses(ticks[round(t / PERIOD)], home)

@@ -17,7 +17,7 @@ struct Pictures : ves::LiveSource {
   std::int64_t edition() const override { return 1; }
   const std::string& scene() const override { return scene_; }
   std::int64_t newest() const override { return number; }
-  std::string picture() const override { return std::string(100, 'x'); }
+  std::string pictures(std::int64_t, std::int64_t&) const override { return std::string(100, 'x'); }
   void requestStop(std::int64_t) override {}
   std::int64_t number = 1;
   std::string scene_ = "{}";

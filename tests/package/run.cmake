@@ -29,7 +29,7 @@ file(READ ${WORK}/demo/summary.json out)
 require("\"parked\"")
 run(gzip -dc ${usr}/share/man/man1/ves.1.gz)
 require("\\.TH VES 1")
-run(bash -c "source ${usr}/share/bash-completion/completions/ves && COMP_WORDS=(ves stab) COMP_CWORD=1
+run(bash -c "source '${usr}/share/bash-completion/completions/ves' && COMP_WORDS=(ves stab) COMP_CWORD=1
   _ves
   echo $COMPREPLY")
 require("stability")

@@ -51,7 +51,7 @@ class Programs : public testing::Test {
   void TearDown() override { fs::remove_all(folder_); }
 
   static std::string app(const std::string& name) {
-    return std::string(VES_TEST_APP_DIR) + "/ves " + name + " ";
+    return std::string("'") + VES_TEST_APP_DIR + "/ves' " + name + " ";
   }
   Output run(const std::string& arguments) { return sh(app("run") + arguments); }
   std::string out(const std::string& name) { return " --out " + (folder_ / name).string() + " "; }

@@ -28,10 +28,11 @@ class LiveRun : public LiveSource {
   std::int64_t edition() const override { return edition_; }
   const std::string& scene() const override { return scene_text_; }
   std::int64_t newest() const override { return newest_; }
-  /// Three doubles {newest(), header.time_ns of the state, real-time factor}, then the floats of
-  /// Scene::picture, the real-time factor, and 1 when a stop was requested, 2 when the controller
-  /// has taken it; little-endian.
-  std::string picture() const override;
+  /// Three doubles {number, header.time_ns of the state, real-time factor} of the last one; then of
+  /// each, the oldest first, the floats of Scene::picture, the real-time factor, and 1 when a stop
+  /// was requested, 2 when the controller has taken it; little-endian. One of every state that was
+  /// heard: who draws seldom misses no sample.
+  std::string pictures(std::int64_t after, std::int64_t& last) const override;
   void requestStop(std::int64_t edition) override;
 
  private:
@@ -41,6 +42,7 @@ class LiveRun : public LiveSource {
   bool follow(const state_t& state);
   void followBase(const state_t& state);
   void measureRate(const state_t& state);
+  void keepPicture();
   void remind();
 
   Bus bus_;
@@ -53,6 +55,12 @@ class LiveRun : public LiveSource {
   RowMaker rows_;
   std::optional<Row> row_;
   std::int64_t newest_ = 0;
+  struct Picture {
+    std::int64_t number, time;  // [-], [ns]
+    double rate;                // [-]
+    std::vector<float> numbers;
+  };
+  std::deque<Picture> pictures_;  // of this scene, the last the newest
 
   std::optional<experiment_t> described_;  // the last
   bool warned_ = false;                    // that it cannot be read

@@ -20,7 +20,9 @@ class LiveSource {
   virtual std::int64_t edition() const = 0;      // of the scene; 0: none yet
   virtual const std::string& scene() const = 0;  // JSON
   virtual std::int64_t newest() const = 0;       // number of the newest picture
-  virtual std::string picture() const = 0;       // that, as bytes
+  /// Those that came after that number, as far as they are kept and fit into a message, as bytes;
+  /// `last` becomes the number of the last one.
+  virtual std::string pictures(std::int64_t after, std::int64_t& last) const = 0;
   virtual void requestStop(std::int64_t edition) = 0;
 };
 
