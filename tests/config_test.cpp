@@ -502,9 +502,13 @@ TEST(Urdf, WarnsAboutALinkThatMovesWithoutMass) {
 
 TEST(Urdf, WarnsAboutInertiasThatNoRigidBodyHas) {
   const UrdfRobot puma = test::robot("puma560");
-  ASSERT_EQ(puma.warnings.size(), 1u);
+  ASSERT_EQ(puma.warnings.size(), 2u);
   for (const char* what : {"puma560.urdf:", "link 'link_1'", "and 1 more: link 'link_3'"})
     EXPECT_NE(puma.warnings[0].find(what), std::string::npos) << puma.warnings[0];
+  // As the report has it, too.
+  EXPECT_NE(puma.warnings[1].find("link 'link_0': its inertia is that of a point"),
+            std::string::npos)
+      << puma.warnings[1];
   EXPECT_NE(test::robot("doss").warnings[0].find("link 'link_3'"), std::string::npos);
 }
 

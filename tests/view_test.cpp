@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <regex>
 #include <set>
 
 #include "support/refusal.hpp"
@@ -176,7 +177,9 @@ class Looks : public testing::Test {
           "solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 2e0 "
           "0\nendloop\nendfacet\nendsolid x\n");
     setenv("ROS_PACKAGE_PATH", folder_.c_str(), 1);
-    std::string text = test::readText(test::configDir() + "/robots/puma560.urdf");
+    std::string text =
+        std::regex_replace(test::readText(test::configDir() + "/robots/puma560.urdf"),
+                           std::regex("<visual>[^]*?</visual>"), "");
     const auto dress = [&](const std::string& link, const std::string& with) {
       const std::string head = "<link name=\"" + link + "\">";
       const std::size_t at = text.find(head);
@@ -234,6 +237,25 @@ TEST_F(Looks, AreDrawnWhereTheDescriptionHasThem) {
   ASSERT_EQ(scene().warnings().size(), 1u);
   EXPECT_EQ(scene().warnings()[0],
             "package://arm/meshes/none.stl: not found, its link is drawn as a line");
+}
+
+// A material of its own, or one that the robot, or a shape before, has named.
+TEST_F(Looks, ShapesHaveTheColoursOfTheirMaterials) {
+  std::string text = test::readText((folder_ / "dressed.urdf").string());
+  const auto put = [&](const std::string& before, const std::string& what) {
+    const std::size_t at = text.find(before);
+    ASSERT_NE(at, std::string::npos) << before;
+    text.insert(at + before.size(), what);
+  };
+  put("<box size='0.1 0.2 0.3'/></geometry>",
+      "<material name='own'><color rgba='1 0 0 1'/></material>");
+  put("<sphere radius='0.04'/></geometry>", "<material name='own'/>");
+  put("<cylinder radius='0.03' length='0.4'/></geometry>", "<material name='above'/>");
+  put("<robot name=\"puma560\">", "<material name='above'><color rgba='0 0.2 1 1'/></material>");
+  write("dressed.urdf", text);
+  EXPECT_EQ(shapes("box", "platform")[0]["colour"], 0xff0000);
+  EXPECT_EQ(shapes("sphere", "link3")[0]["colour"], 0xff0000);
+  EXPECT_EQ(shapes("rod", "link3")[0]["colour"], 0x0033ff);
 }
 
 TEST_F(Looks, AMeshThatIsNoneIsNamed) {

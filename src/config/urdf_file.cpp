@@ -530,7 +530,8 @@ class Reader {
     shape.attribute("name");
     Visual out;
     out.X_frame = readOrigin(shape);
-    for (Element& material : shape.children("material")) picture([&] { readMaterial(material); });
+    for (Element& material : shape.children("material"))
+      picture([&] { out.colour = readMaterial(material); });
     Element geometry = shape.requiredChild("geometry");
     geometry.attribute("name");
     using Kind = Visual::Kind;

@@ -77,17 +77,21 @@
       }
       this.force = new THREE.ArrowHelper(new THREE.Vector3(0, 0, 1), new THREE.Vector3(), 0.1, 0xc1121f, 0.08, 0.05);
       world.add(this.force);
-      this.arm = recording.scene.arm.slice(1).map(() => {
-        const mesh = new THREE.Mesh(new THREE.CylinderBufferGeometry(recording.scene.arm_radius, recording.scene.arm_radius, 1, 16),
-          new THREE.MeshStandardMaterial({color: look.colour || 0xb9b2a0, roughness: 0.7, transparent: look.opacity < 1, opacity: look.opacity || 1}));
+      // White booms between dark joints, as the Shuttle's arm has them.
+      const part = (geometry, colour) => {
+        const mesh = new THREE.Mesh(geometry, new THREE.MeshStandardMaterial(
+          {color: look.colour || colour, roughness: 0.7, transparent: look.opacity < 1, opacity: look.opacity || 1}));
         world.add(mesh);
         return mesh;
-      });
+      };
+      const radius = recording.scene.arm_radius;
+      this.arm = recording.scene.arm.slice(1).map(() => part(new THREE.CylinderBufferGeometry(radius, radius, 1, 24), 0xeeeeea));
+      this.armJoints = recording.scene.arm.map(() => part(new THREE.SphereBufferGeometry(1.25 * radius, 24, 16), 0x3b4048));
     }
     remove() {
       for (const f of this.recording.scene.frames) if (f.parent === '') this.world.remove(this.frames[f.name]);
       for (const shape of this.shapes) this.world.remove(shape);
-      for (const mesh of this.arm) this.world.remove(mesh);
+      for (const mesh of this.arm.concat(this.armJoints)) this.world.remove(mesh);
       this.world.remove(this.force);
     }
     /** `show`: ghost, newtonsPerMetre, bending. */
@@ -118,6 +122,10 @@
       }
       const points = r.scene.arm.map((p, k) =>
         new THREE.Vector3(...p).addScaledVector(new THREE.Vector3(...r.bent(i, k)), show.bending));
+      this.armJoints.forEach((mesh, k) => {
+        mesh.position.copy(points[k]);
+        mesh.visible = k > 0 && k < points.length - 1;
+      });
       this.arm.forEach((mesh, k) => {
         const way = points[k + 1].clone().sub(points[k]), length = way.length();
         mesh.visible = length > 1e-6;
@@ -133,7 +141,9 @@
     const material = new THREE.MeshStandardMaterial({
       color: look.colour || shape.colour || (shape.world && 0x5b8c6a) || {plate: 0x6b7885, cylinder: 0x8d99a6, capsule: 0xe0903a, rod: 0xe0903a, sphere: 0xe0903a, box: 0xe0903a, mesh: 0xe0903a, axes: 0x333333}[shape.kind],
       transparent: look.opacity < 1, opacity: look.opacity || 1, roughness: 0.6, metalness: 0.1,
-      depthWrite: !(look.opacity < 1)});
+      depthWrite: !(look.opacity < 1),
+      // Where the ghost is in the same place, it is behind.
+      polygonOffset: look.opacity < 1, polygonOffsetFactor: 2, polygonOffsetUnits: 2});
     const group = new THREE.Group();
     const add = (geometry, place) => {
       const mesh = new THREE.Mesh(geometry, material);
@@ -197,7 +207,7 @@
   world.add(sun);
   const grid = new THREE.GridHelper(6, 24);
   grid.rotation.x = Math.PI / 2;
-  world.add(grid);
+  world.add(grid);  // the laboratory's floor
   function look(view) {
     const size = first.scene.size, reach = Math.min(first.scene.reach, 3 * size), target = new THREE.Vector3(0, 0, 0.8 * first.scene.home + 0.25 * reach);
     let far = 2.6 * size + first.scene.home + 0.7 * reach;
@@ -302,6 +312,7 @@
     for (const chart of SHOWN) chartOf(...chart);
     fit();
     for (const place of document.querySelectorAll('.arm')) place.hidden = first.scene.arm.length < 2;
+    grid.visible = first.scene.arm.length < 2;  // the arm stands in space, and not in a floor
     document.title = first.scene.name;
     element('seek').max = Math.max(0, first.count - 1);
     look('iso');

@@ -35,7 +35,7 @@ class Drawing {
     }
   };
 
-  void stroke(const Vec3& a, const Vec3& b, double width, const char* colour, bool round) {
+  void stroke(const Vec3& a, const Vec3& b, double width, std::string_view colour, bool round) {
     add({a, b}, width, false,
         fmt::format("stroke=\"{}\" stroke-width=\"{:.4f}\" stroke-linecap=\"{}\"", colour, width,
                     round ? "round" : "butt"));
@@ -123,6 +123,8 @@ Drawing drawn(const Scene& scene, const std::vector<float>& picture, StillView v
   for (const Json& shape : d["shapes"]) {
     const Transform& X = frames[shape["frame"].get<std::string>()];
     const auto kind = shape["kind"].get<std::string>();
+    const std::string colour =
+        shape.contains("colour") ? fmt::format("#{:06x}", shape["colour"].get<int>()) : kRobot;
     if (kind == "plate") {
       std::vector<Vec3> corners;
       for (const Json& c : shape["corners"])
@@ -150,10 +152,10 @@ Drawing drawn(const Scene& scene, const std::vector<float>& picture, StillView v
         if (kind == "rod") half.z() = 0.5 * number(shape["length"]);
         width = 2.0 * number(shape["radius"]);
       }
-      drawing.stroke(here * Vec3(-half), here * half, width, kRobot, kind == "sphere");
+      drawing.stroke(here * Vec3(-half), here * half, width, colour, kind == "sphere");
     } else if (kind == "capsule") {
       drawing.stroke(X * point(shape["from"]), X * point(shape["to"]),
-                     2.0 * number(shape["radius"]), kRobot, true);
+                     2.0 * number(shape["radius"]), colour, true);
     }
   }
   if (view == StillView::kArm)
