@@ -56,11 +56,18 @@ int robotCommand(int argc, char** argv) {
       "ves robot");
   std::string file;
   std::vector<std::string> sets;
-  cli.add_option("file", file, "a URDF, or a robot's .yaml as in config/robots")->required();
+  cli.add_option("file", file, "a URDF, a robot's .yaml, or the name of one in config/robots")
+      ->required();
   cli.add_option("--set", sets, "tip=LINK, joints=[..], lock.JOINT=VALUE (deg or m)")
       ->allow_extra_args(false);
   return run(cli, argc, argv, [&] {
-    const auto [described, robot, q] = loadRobot(file, sets);
+    // A name alone is one of config/robots, as elsewhere.
+    std::error_code error;
+    const bool named =
+        file.find_first_of("./") == std::string::npos && !std::filesystem::exists(file, error);
+    const std::string found =
+        named ? findFile("robot", file, configFolder() / "robots").string() : file;
+    const auto [described, robot, q] = loadRobot(found, sets);
     const RigidBody all = compositeBody(robot.model, q);
     const Vec3 moments = symmetricEigenvalues(all.I_Bcm_B);
     const Vec3& c = all.p_BoBcm_B;

@@ -52,6 +52,10 @@ TEST(Command, TrajectoryTakesEachCoordinateInMillimetresAndDegrees) {
 }
 
 TEST(Command, MoveRobotAndCollect) {
+  const Command v = parseCommand("vehicle in 2 stiffness 3 mass 0.5", puma());
+  EXPECT_EQ(v.order.request, Request::kVehicle);
+  EXPECT_EQ(v.order.vehicle.to, (VehicleFactors{0.5, 0.0, 3.0}));
+  EXPECT_EQ(v.order.vehicle.over, 2.0);
   const Command m = parseCommand("move in 4 x 50 beta 4", puma());
   EXPECT_EQ(m.order.segment.kind, SegmentKind::kMove);
   EXPECT_EQ(m.order.segment.duration, 4.0);
@@ -97,6 +101,12 @@ INSTANTIATE_TEST_SUITE_P(
         BadLine{"99", "'99', want one of"}, BadLine{"admittance", "seconds: missing"},
         BadLine{"admittance nan", "seconds: 'nan', want a number in [0.01, 100000] s"},
         BadLine{"admittance 1e9", "want a number"}, BadLine{"admittance 3 4", "one word too many"},
+        BadLine{"move 4 x 50", "(move [in SECONDS] [COORDINATE TO]...)"},
+        BadLine{"hold 3", "'3': one word too many (hold takes no more)"},
+        BadLine{"vehicle in 2", "nothing to change"},
+        BadLine{"vehicle mass 0", "mass: '0', want a number in [0.01, 100] times"},
+        BadLine{"vehicle mass 2 mass 3", "mass: given twice"},
+        BadLine{"vehicle weight 2", "'weight', want mass, damping, stiffness or in"},
         BadLine{"trajectory 3 z", "z: ramp or sine: missing"},
         BadLine{"trajectory 3 w sine 1 1", "'w', want one of x, y, z"},
         BadLine{"trajectory 3 z jump 1", "z: 'jump', want ramp or sine"},

@@ -68,6 +68,11 @@ TEST_F(Programs, RunAloneNamesWhatThereIs) {
         << entry.path();
 }
 
+TEST_F(Programs, ARobotMayBeNamedAsInConfig) {
+  EXPECT_EQ(sh(app("robot") + "puma560").status, 0);
+  EXPECT_NE(sh(app("robot") + "puma56").text.find("did you mean 'puma560'?"), std::string::npos);
+}
+
 TEST_F(Programs, AFolderStandsForTheLogInIt) {
   EXPECT_EQ(run("z_sine --lockstep --no-plots" + out("a")).status, 0);
   const std::string folder = " '" + (folder_ / "a").string() + "'";

@@ -282,11 +282,11 @@ Verb parseVerb(const std::string& word) {
   return found->verb;
 }
 
-Command parseCommand(const std::string& line, const Experiment& experiment) {
+namespace {
+
+/// What stands behind the verb.
+void parseArguments(Words& words, const Experiment& experiment, Command& command) {
   const SafetyLimits& limits = experiment.controller.safety;
-  Words words(line);
-  Command command;
-  command.verb = parseVerb(words.word("command"));
   Order& order = command.order;
   const auto segment = [&](const Segment& s) {
     order.request = Request::kRun;
@@ -328,6 +328,24 @@ Command parseCommand(const std::string& line, const Experiment& experiment) {
     case Verb::kHelp: break;
   }
   words.end();
+}
+
+}  // namespace
+
+Command parseCommand(const std::string& line, const Experiment& experiment) {
+  Words words(line);
+  Command command;
+  command.verb = parseVerb(words.word("command"));
+  try {
+    parseArguments(words, experiment, command);
+  } catch (const InputError& error) {
+    const auto item = std::find_if(menu().begin(), menu().end(),
+                                   [&](const Item& one) { return one.verb == command.verb; });
+    throw InputError(fmt::format("{} ({})", error.what(),
+                                 *item->arguments
+                                     ? fmt::format("{} {}", item->word, item->arguments)
+                                     : fmt::format("{} takes no more", item->word)));
+  }
   return command;
 }
 
