@@ -71,6 +71,8 @@ void Laws::ticked(const TickInput& in, const TickState& s) {
   orders(s);
   trips(s);
   permitted(in, s);
+  if (!(s.vehicle_energy <= 1e-9))
+    broken("passive", fmt::format("a change of the vehicle has put in {:.3g} J", s.vehicle_energy));
   said_[s.tick] = {s.legs.L, s.phase == Phase::kStopped};
   said_.erase(s.tick - 256);
   desired_rate_ = s.desired == s.motion.x || !last_ ? s.motion.x_dot : last_->motion.x_dot;

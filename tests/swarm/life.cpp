@@ -277,8 +277,14 @@ Life draw(std::uint64_t seed, const std::filesystem::path& config) {
       life.events.push_back(ask(tick, "hold"));
     } else if (what < 66) {
       life.events.push_back(ask(tick, "stop"));
-    } else if (what < 70) {
+    } else if (what < 68) {
       life.events.push_back(ask(tick, "tare"));
+    } else if (what < 70) {
+      const auto factor = [&] { return std::exp2(dice.between(-1.0, 1.0)); };
+      life.events.push_back(
+          ask(tick, fmt::format("vehicle in {:.1f} mass {:.2f} damping {:.2f} "
+                                "stiffness {:.2f}",
+                                dice.between(0.0, 3.0), factor(), factor(), factor())));
     } else if (what < 74) {
       life.events.push_back(ask(tick, "compensate"));
     } else if (what < 78) {

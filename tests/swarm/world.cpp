@@ -15,6 +15,7 @@
 #include "ves/run/robot_orders.hpp"
 #include "ves/run/run.hpp"
 #include "ves/run/run_monitor.hpp"
+#include "ves/run/vehicle_judge.hpp"
 
 namespace ves::swarm {
 namespace {
@@ -250,7 +251,7 @@ class World {
     }
     laws_.ticked(c.in, state);
     note(state);
-    c.in.order = c.link.takeOrder();
+    c.in.order = judged(c.link.takeOrder(), e_, state);
     c.in.conflicting_node = c.link.takeConflict();
     if (!c.monitor.reached(state, c.in.order.request)) return;
     const RunResult result = c.monitor.result(0);
