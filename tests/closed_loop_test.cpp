@@ -443,6 +443,28 @@ TEST_F(ClosedLoop, TheEmulationErrorIsToldInSharesOfTheAmplitudeFromRest) {
   EXPECT_LT(most, 1e-3);
 }
 
+TEST_F(ClosedLoop, WhatIsNotComparedSaysWhy) {
+  const auto told = [&](const Experiment& e, const Watch& watch) {
+    const Series series = run(e, watch);
+    const auto summary = summarise(series, result_);
+    EXPECT_FALSE(summary.contains("emulation_error_rms_m"));
+    return table(summary);
+  };
+  Order another{Request::kVehicle, {}, {}};
+  another.vehicle = {{0.0, 0.0, 2.0}, 1.0};
+  int n = 0;
+  EXPECT_NE(told(experiment("free_decay"),
+                 [&](const TickState& s) {
+                   return s.kind == SegmentKind::kAdmittance && ++n == 100 ? another : Order();
+                 })
+                .find("not compared with the base in free space: the vehicle was changed"),
+            std::string::npos);
+  EXPECT_NE(told(experiment("srms_deploy_puma", {"base.keep_modes=13"}), nullptr)
+                .find("the base has 13 modes; base.keep_modes=12 or fewer"),
+            std::string::npos);
+  EXPECT_EQ(told(experiment("z_sine"), nullptr).find("not compared"), std::string::npos);
+}
+
 TEST_F(ClosedLoop, AnEmulationThatIsFarOffSaysWhy) {
   const Series series = run(experiment("srms_deploy_doss"));
   const auto summary = summarise(series, result_);

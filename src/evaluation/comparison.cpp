@@ -102,9 +102,8 @@ Vec6 restOf(const ModalModel& base, const Vec6& x) {
 
 std::optional<Motion> baseMotion(const Experiment& e, const Vec6& start,
                                  ReferenceMotions& references) {
-  constexpr Eigen::Index kMostModes = 12;
   if (!wantsAdmittance(e.controller.program) ||
-      e.controller.admittance.stiffness.size() > kMostModes)
+      e.controller.admittance.stiffness.size() > kMostComparedModes)
     return {};
   std::int64_t duration = 0;
   Interaction interaction = interactionOf(e, duration);
@@ -117,10 +116,22 @@ bool ofConfiguredVehicle(const state_t& s) noexcept {
   return s.vehicle_mass == 1.0 && s.vehicle_damping == 1.0 && s.vehicle_stiffness == 1.0;
 }
 
-std::optional<Emulation> emulation(const Series& series, ReferenceMotions& references) {
+std::string whyNotCompared(const Series& series) {
+  if (std::none_of(series.rows.begin(), series.rows.end(),
+                   [](const Row& row) { return inAdmittance(row.state); }))
+    return "";
   if (!std::all_of(series.rows.begin(), series.rows.end(),
                    [](const Row& row) { return ofConfiguredVehicle(row.state); }))
-    return {};
+    return "the vehicle was changed on the way";
+  if (const auto modes = series.experiment.controller.admittance.stiffness.size();
+      modes > kMostComparedModes)
+    return fmt::format("the base has {} modes; base.keep_modes={} or fewer is compared", modes,
+                       kMostComparedModes);
+  return "";
+}
+
+std::optional<Emulation> emulation(const Series& series, ReferenceMotions& references) {
+  if (!whyNotCompared(series).empty()) return {};
   Emulation out;
   out.platform = actual(series);
   if (out.platform.x.size() < 2) return {};

@@ -200,7 +200,11 @@ std::string adviceOf(const ControllerConfig& c) {
 /// How far the platform was from the robot on its base in free space.
 void addEmulation(const Series& series, const std::optional<Emulation>& e,
                   nlohmann::ordered_json& out) {
-  if (!e) return;
+  if (!e) {
+    if (const std::string why = whyNotCompared(series); !why.empty())
+      out["emulation_not_compared"] = why;
+    return;
+  }
   const Distance error = distance(e->platform, e->base), moved = travel(e->base);
   const Amplitude most = amplitude(series.experiment, e->base);
   const auto share = [&](const char* key, double rms, double of) {

@@ -41,6 +41,9 @@ std::string table(const nlohmann::ordered_json& s) {
                        cause);
   if (const std::string rejected = s.value("samples_rejected", ""); !rejected.empty())
     out += fmt::format("  {}\n", rejected);
+  if (s.contains("emulation_not_compared"))
+    out += fmt::format("  emulation not compared with the base in free space: {}\n",
+                       s["emulation_not_compared"].get<std::string>());
   if (s.contains("emulation_error_rms_m")) {
     const auto share = [&](const char* key) {
       return s.contains(key) ? fmt::format(" ({:.3g} %)", 100.0 * number(key)) : "";

@@ -95,6 +95,13 @@ std::optional<Motion> baseMotion(const Experiment& experiment, const Vec6& start
 /// Whether the vehicle is the configuration's, which an order may have changed.
 bool ofConfiguredVehicle(const state_t& state) noexcept;
 
+/// With more the motion in free space takes longer to compute than the run.
+inline constexpr int kMostComparedModes = 12;  // [-]
+
+/// What keeps a run with admittance control from being compared with its base in free space; empty
+/// when nothing does, or there was none.
+std::string whyNotCompared(const Series& series);
+
 /// The same from where the platform was let go, beside what it did. None of a run without two ticks
 /// of it, or with another vehicle for a while.
 std::optional<Emulation> emulation(const Series& series, ReferenceMotions& references);
