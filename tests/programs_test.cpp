@@ -271,10 +271,12 @@ TEST_F(Programs, AnMcapFileThatCannotBeWrittenIsOneLine) {
       sh(app("collect") + (folder_ / "a/run.lcmlog").string() + " --mcap /nonexistent/x.mcap");
   EXPECT_EQ(log.status, 2) << log.text;
   // Of a run on the bus too: what a callback throws ends in a line, and not the process.
-  const Output follow =
-      sh(app("on-bus") + "mcap_test bash -c '" + app("controller") + "z_sine --no-menu & c=$!; " +
-         app("plant") + "z_sine & p=$!; " + app("collect") +
-         "--follow --mcap /nonexistent/x.mcap; s=$?; kill $c $p; exit $s'");
+  const fs::path script = folder_ / "follow.sh";
+  std::ofstream(script) << app("controller") << "z_sine --no-menu & c=$!\n"
+                        << app("plant") << "z_sine & p=$!\n"
+                        << app("collect") << "--follow --mcap /nonexistent/x.mcap\n"
+                        << "s=$?; kill $c $p; exit $s\n";
+  const Output follow = sh(app("on-bus") + "mcap_test bash " + script.string());
   EXPECT_EQ(follow.status, 2) << follow.text;
   EXPECT_NE(follow.text.find("/nonexistent/x.mcap"), std::string::npos) << follow.text;
 }
