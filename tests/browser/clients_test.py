@@ -32,7 +32,11 @@ class Frames:
             self.scene = json.loads(payload)
             return self.take()
         number, _, _ = struct.unpack("<3d", payload[:24])
-        assert len(payload) == 24 + 4 * self.scene["width"]
+        size = 4 * self.scene["width"]
+        assert len(payload) > 24 and (len(payload) - 24) % size == 0
+        # All that came since the last one, and none twice.
+        pictures = (len(payload) - 24) // size
+        assert not self.got or number - pictures == self.got[-1], (number, pictures, self.got[-1])
         self.got.append(number)
         self.page.send(b"drawn")
         return self.got[-1]
