@@ -155,6 +155,10 @@ int conformCommand(int argc, char** argv) {
     for (const Requirement& r : all)
       fmt::print("{} {:<16} {:<42} {}\n", r.kept ? "ok" : "NO", r.name, r.asked, r.found);
     if (moves && !well) fmt::print("nothing was moved\n");
+    if (all.front().name == std::string("samples") && !all.front().kept)
+      fmt::print(
+          "no machine is heard on {}: start yours, or ./ves plant {} to see one that passes\n",
+          options.process.url, options.scenario);
     return std::all_of(all.begin(), all.end(), kept) ? kDone : kTripped;
   });
 }

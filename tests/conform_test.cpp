@@ -153,6 +153,7 @@ TEST_F(ConformProgram, OurOwnPlantKeepsAllAndMoves) {
   EXPECT_EQ(none.status, 1);
   EXPECT_NE(none.text.find("NO samples"), std::string::npos) << none.text;
   EXPECT_NE(none.text.find("nothing was moved"), std::string::npos) << none.text;
+  EXPECT_NE(none.text.find("start yours, or ./ves plant z_sine"), std::string::npos) << none.text;
   Process plant = start("plant", {"z_sine"});
   const test::Output all = test::sh(conform + " --move");
   EXPECT_EQ(all.status, 0) << all.text;

@@ -145,7 +145,9 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
     if (wantsOut()) return letGo();
     if (!told && monotonicNow() - start > kWarnAfter) {
       told = true;
-      fmt::print(stderr, "controller: waiting for a machine on {}\n", options.url);
+      fmt::print(stderr,
+                 "controller: waiting for a machine on {}: ./ves plant SCENARIO, or a driver\n",
+                 options.url);
     }
     const std::string why = notLetIn(link, bus);
     if (monotonicNow() - start > kFirstSampleTime)
