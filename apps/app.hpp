@@ -104,13 +104,12 @@ inline std::filesystem::path configFolder() {
 }
 
 /// A run's folder stands for the log in it.
-inline CLI::Option* asLog(CLI::Option* option) {
-  return option->transform([](const std::string& given) {
-    std::error_code error;
-    const std::filesystem::path path(given);
-    return std::filesystem::is_directory(path, error) ? (path / "run.lcmlog").string() : given;
-  });
+inline std::string logOf(const std::string& given) {
+  std::error_code error;
+  const std::filesystem::path path(given);
+  return std::filesystem::is_directory(path, error) ? (path / "run.lcmlog").string() : given;
 }
+inline CLI::Option* asLog(CLI::Option* option) { return option->transform(logOf); }
 
 /// For logs of lcm-logger that began after the configuration was announced.
 inline void addScenarioOfLog(CLI::App& cli, std::string& scenario) {

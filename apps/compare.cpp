@@ -19,12 +19,6 @@ struct ComparedRun {
   Series series;
 };
 
-/// A run's folder, or its log.
-std::string logOf(const std::string& run) {
-  const std::filesystem::path path(run);
-  return std::filesystem::is_directory(path) ? (path / "run.lcmlog").string() : run;
-}
-
 std::vector<std::vector<std::string>> rowsOf(const std::vector<KeyDifference>& differences) {
   std::vector<std::vector<std::string>> rows;
   for (const KeyDifference& one : differences) {

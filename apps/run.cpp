@@ -10,15 +10,11 @@ namespace {
 
 /// What there is to run, a line each.
 [[noreturn]] void listScenarios() {
-  std::vector<std::filesystem::path> files;
-  std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator(configFolder() / "scenarios", error))
-    if (entry.path().extension() == ".yaml") files.push_back(entry.path());
-  std::sort(files.begin(), files.end());
-  for (const std::filesystem::path& file : files) {
-    const Value document = loadDocument(file);
+  const std::filesystem::path folder = configFolder() / "scenarios";
+  for (const std::string& name : namesIn(folder)) {
+    const Value document = loadDocument(folder / (name + ".yaml"));
     const Value* about = document.find("description");
-    fmt::print("  {:<24}{}\n", file.stem().string(), about ? about->text : "");
+    fmt::print("  {:<24}{}\n", name, about ? about->text : "");
   }
   throw InputError("which scenario? One of these, or a path to a .yaml file");
 }

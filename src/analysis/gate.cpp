@@ -205,13 +205,16 @@ LoopVerdict assessStability(const ControllerConfig& controller, const RobotTask&
   for (const Direction direction : kBoth) {
     double most = 0.0;
     Loop& kept = direction == Direction::kExtending ? out.extending : out.retracting;
-    const Loop loop = loopOf(controller, task.initial_joints, direction);
-    for (const CarriedRobot& robot : robots) {
-      const Loop with = carrying(loop, robot);
-      const double r = radius(with);
-      if (r <= most) continue;
-      most = r;
-      kept = with;
+    Loop loop = loopOf(controller, task.initial_joints, direction);
+    for (const double share : feltShares(controller)) {
+      loop.felt = share;
+      for (const CarriedRobot& robot : robots) {
+        const Loop with = carrying(loop, robot);
+        const double r = radius(with);
+        if (r <= most) continue;
+        most = r;
+        kept = with;
+      }
     }
     if (most <= largest) continue;
     largest = most;

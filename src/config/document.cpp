@@ -387,6 +387,15 @@ std::string emit(const Value& document) {
   return std::string(out.c_str()) + "\n";
 }
 
+std::vector<std::string> namesIn(const std::filesystem::path& folder) {
+  std::vector<std::string> names;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error))
+    if (entry.path().extension() == ".yaml") names.push_back(entry.path().stem().string());
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
 std::filesystem::path findFile(const std::string& kind, const std::string& name,
                                const std::filesystem::path& folder) {
   const std::filesystem::path given(name);
@@ -394,10 +403,7 @@ std::filesystem::path findFile(const std::string& kind, const std::string& name,
   const std::filesystem::path named = folder / (name + ".yaml");
   std::error_code error;
   if (!name.empty() && std::filesystem::exists(named, error)) return named;
-  std::vector<std::string> names;
-  for (const auto& entry : std::filesystem::directory_iterator(folder, error))
-    if (entry.path().extension() == ".yaml") names.push_back(entry.path().stem().string());
-  std::sort(names.begin(), names.end());
+  const std::vector<std::string> names = namesIn(folder);
   const std::string meant = nearest(name, names);
   if (!meant.empty())
     throw InputError(fmt::format("{} '{}': unknown, did you mean '{}'?", kind, name, meant));

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "ves/core/coordinates.hpp"
+#include "ves/evaluation/comparison.hpp"
 
 namespace ves {
 
@@ -37,7 +38,7 @@ std::string statusText(const Status& status) {
   } else {
     out += "  bias       none: not calibrated\n";
   }
-  if (s.vehicle_mass != 1.0 || s.vehicle_damping != 1.0 || s.vehicle_stiffness != 1.0)
+  if (!ofConfiguredVehicle(s))
     out += fmt::format(
         "  vehicle    mass {:.3g}, damping {:.3g}, stiffness {:.3g} times the scenario's\n",
         s.vehicle_mass, s.vehicle_damping, s.vehicle_stiffness);

@@ -53,8 +53,11 @@ Value parseDocument(const std::string& text, const std::string& name);
 /// Applies "a.b.c=value" as if it stood in the file.
 void applyOverride(Value& document, const std::string& assignment);
 
-/// The file of a `kind` given by path or by its name in `folder`. Throws InputError, listing what
-/// there is.
+/// Of the .yaml files in a folder, without the ending, sorted; none where it cannot be read.
+std::vector<std::string> namesIn(const std::filesystem::path& folder);
+
+/// The file of a `kind` given by path or by its name in `folder`. Throws InputError that says what
+/// is meant, or there.
 std::filesystem::path findFile(const std::string& kind, const std::string& name,
                                const std::filesystem::path& folder);
 

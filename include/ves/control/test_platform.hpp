@@ -41,9 +41,8 @@ class TestPlatform {
     Wrench total;          // measured
     Wrench static_wrench;  // of gravity
     Wrench inertial;       // of the robot's composite body, when that is compensated
-    Wrench
-        felt;  // total - static_wrench + inertial, minus the residual that is classified as noise
-    Wrench dynamic;  // that, behind dead band and low-pass
+    Wrench felt;           // total - static_wrench + inertial, less what is withheld as noise
+    Wrench dynamic;        // that, behind dead band and low-pass
   };
   Waypoint<6> nextMotion(const Wrenches& W) noexcept;
   Checked safetyChecks(const Proposal& next, const Wrench& dynamic, bool conflict) const noexcept;
