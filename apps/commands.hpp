@@ -20,6 +20,7 @@ int plantCommand(int argc, char** argv);
 int platformCommand(int argc, char** argv);
 int plotCommand(int argc, char** argv);
 int replayCommand(int argc, char** argv);
+int keysCommand(int argc, char** argv);
 int reportCommand(int argc, char** argv);
 int robotCommand(int argc, char** argv);
 int runCommand(int argc, char** argv);

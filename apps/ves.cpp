@@ -28,6 +28,7 @@ constexpr Command kCommands[] = {
     {"plot", "columns of a log as a picture (--select)", plotCommand},
     {"compare", "runs side by side: configurations, results, curves", compareCommand},
     {"view", "a recorded run in three dimensions, as one file for a browser", viewCommand},
+    {"keys", "what scenario files may say, with unit, range and default", keysCommand},
     {"report", "chapter 4 of the report once more, as one page", reportCommand},
     {"srms", "the flexible base, and the robot on it (chapter 3)", srmsCommand},
     {"stability", "whether the force feedback decays: this machine's, Appendix E's",

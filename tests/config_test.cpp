@@ -9,6 +9,7 @@
 #include "support/refusal.hpp"
 #include "support/robots.hpp"
 #include "ves/config/experiment.hpp"
+#include "ves/config/keys.hpp"
 
 namespace ves {
 namespace {
@@ -38,6 +39,32 @@ TEST(Config, AMachineSamplesTwiceInEveryTick) {
   };
   EXPECT_EQ(of("10000000"), 2'000'000);
   EXPECT_EQ(of("1000000"), 500'000);
+}
+
+// A reader that asks for one more key fails here until config/keys.yaml says what it means, and a
+// sentence about a key that nobody asks for fails, too.
+TEST(Config, EveryKeyHasASentenceAndEverySentenceAKey) {
+  const KeyMeaning root = keyMeanings(test::configDir());
+  int count = 0;
+  walkKeys(root, [&](const KeyMeaning& key) {
+    ++count;
+    EXPECT_FALSE(key.sentence.empty()) << key.path << ": config/keys.yaml says nothing of it";
+    const bool written_by_ves =
+        key.path == "calibration" || key.path == "masses" || key.path == "servo";
+    const bool asked = key.asked.kinds != 0 || key.path == "reality" || written_by_ves;
+    EXPECT_TRUE(asked) << key.path << ": no scenario and no example has it, or no reader";
+  });
+  EXPECT_GT(count, 300);
+}
+
+TEST(Config, ABoundThatDependsOnOtherKeysIsNone) {
+  AskedKey key;
+  key.take(AskedKey::kNumber, 0.0, 1.0);
+  key.take(AskedKey::kNumber, 0.0, 2.0);
+  EXPECT_EQ(typeOfKey(key), "number, at least 0");
+  EXPECT_EQ(unitOfKey("mass_kg"), "kg");
+  EXPECT_EQ(unitOfKey("gain_extend_in_per_s_per_ma"), "in/s/mA");
+  EXPECT_EQ(unitOfKey("mass"), "");
 }
 
 TEST(Config, ABeginningIsMeantRatherThanAnotherWord) {

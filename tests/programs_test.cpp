@@ -34,6 +34,16 @@ TEST_F(Programs, LockstepRunLeavesItsFiles) {
   EXPECT_EQ(commands(folder_ / "a"), commands(folder_ / "b"));
 }
 
+TEST_F(Programs, TheReferenceOfKeysIsWhatTheProgramPrints) {
+  const Output o = sh(app("keys") + "--markdown");
+  ASSERT_EQ(o.status, 0) << o.text;
+  std::ifstream in(fs::path(VES_TEST_SOURCE_DIR) / "docs/scenario.md");
+  const std::string page((std::istreambuf_iterator<char>(in)), {});
+  EXPECT_TRUE(page.ends_with(o.text)) << "docs/scenario.md: ./ves keys --markdown prints its end";
+  EXPECT_NE(sh(app("keys") + "controler").text.find("did you mean controller?"), std::string::npos);
+  EXPECT_NE(sh(app("keys") + "program.trajectory.z").text.find("counted from home"), std::string::npos);
+}
+
 TEST_F(Programs, TrippedRunEndsWithOne) {
   const Output o =
       run("z_sine --lockstep --no-plots --set safety.position_error_m=0.03" + out("a"));

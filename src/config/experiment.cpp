@@ -69,9 +69,9 @@ void warnOfFullChannels(Experiment& e) {
           100.0 * most(i) / kFullScale, wrenchComponent(i).name, i));
 }
 
-Experiment build(const Value& document) {
+Experiment build(const Value& document, AskedKey* asked = nullptr) {
   Experiment out;
-  Section root(document, "");
+  Section root(document, "", asked);
   root.integer("schema", 1, 1);
   out.name = root.text("name");
   if (out.name.empty() ||
@@ -260,6 +260,8 @@ Experiment buildExperiment(Value document, const std::vector<std::string>& overr
   out.source.document = std::move(document);
   return out;
 }
+
+void askKeys(const Value& document, AskedKey& asked) { build(document, &asked); }
 
 Experiment parseExperiment(const std::string& resolved, const std::string& name) {
   return buildExperiment(parseDocument(resolved, name));

@@ -186,13 +186,14 @@ ForceSensorSource readStream(Section& machine) {
 /// What `force_sensor` may say, and who reads the section that goes with it.
 struct ForceSensorKind {
   std::string_view name;
+  bool section;
   ForceSensorSource (*read)(Section& machine);
 };
 constexpr ForceSensorKind kForceSensors[] = {
-    {"simulated", [](Section&) -> ForceSensorSource { return Simulated{}; }},
-    {"external", [](Section&) -> ForceSensorSource { return External{}; }},
-    {"net_ft", readNetFt},
-    {"stream", readStream},
+    {"simulated", false, [](Section&) -> ForceSensorSource { return Simulated{}; }},
+    {"external", false, [](Section&) -> ForceSensorSource { return External{}; }},
+    {"net_ft", true, readNetFt},
+    {"stream", true, readStream},
 };
 static_assert(std::size(kForceSensors) == std::variant_size_v<ForceSensorSource>,
               "each kind of force sensor has a line in kForceSensors");
@@ -204,7 +205,7 @@ ForceSensorSource readForceSensor(Section& machine) {
   const std::string chosen = machine.choice("force_sensor", names);
   ForceSensorSource out;
   for (const ForceSensorKind& kind : kForceSensors) {
-    if (kind.name != chosen && !machine.has(kind.name)) continue;
+    if (kind.name != chosen && !(kind.section && machine.has(kind.name))) continue;
     const ForceSensorSource one = kind.read(machine);
     if (kind.name == chosen) out = one;
   }

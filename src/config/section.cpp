@@ -8,6 +8,7 @@
 
 #include "spelling.hpp"
 #include "ves/config/document.hpp"
+#include "ves/config/keys.hpp"
 
 namespace ves {
 namespace {
@@ -30,13 +31,21 @@ std::string interval(double lo, double hi) {
 
 }  // namespace
 
-Section::Section(const Value& value, std::string path) : value_(&value), path_(std::move(path)) {
+Section::Section(const Value& value, std::string path, AskedKey* asked)
+    : value_(&value), path_(std::move(path)), asked_(asked) {
   if (value.kind != Value::Kind::kMap)
     failAt(value, path_, fmt::format("is {}, want a map of keys", kindName(value)));
+  if (asked_) ++asked_->visits;
+}
+
+/// Nobody, where nobody wants to know.
+AskedKey* Section::asked(std::string_view key) {
+  return asked_ ? &asked_->keys[std::string(key)] : nullptr;
 }
 
 bool Section::has(std::string_view key) {
   used_.emplace(key);
+  asked(key);
   return value_->find(key) != nullptr;
 }
 
@@ -48,6 +57,7 @@ bool Section::isList(std::string_view key) {
 const Value& Section::need(std::string_view key) {
   used_.emplace(key);
   const Value* value = value_->find(key);
+  if (AskedKey* const k = asked(key)) k->need(value);
   if (value) return *value;
   // A slip of the pen is told as such.
   for (const std::string& given : value_->keys)
@@ -70,10 +80,12 @@ double Section::toNumber(const Value& value, const std::string& path, double lo,
 }
 
 double Section::number(std::string_view key, double lo, double hi) {
+  if (AskedKey* const k = asked(key)) k->take(AskedKey::kNumber, lo, hi);
   return toNumber(need(key), fmt::format("{}{}", path_.empty() ? "" : path_ + ".", key), lo, hi);
 }
 
 double Section::numberOr(std::string_view key, double lo, double hi, double derived) {
+  if (AskedKey* const k = asked(key)) k->take(AskedKey::kNumber | AskedKey::kDerived, lo, hi);
   const Value& value = need(key);
   if (value.kind != Value::Kind::kScalar || value.text != "derived") return number(key, lo, hi);
   if (!(derived >= lo && derived <= hi))
@@ -82,6 +94,8 @@ double Section::numberOr(std::string_view key, double lo, double hi, double deri
 }
 
 std::int64_t Section::integer(std::string_view key, std::int64_t lo, std::int64_t hi) {
+  if (AskedKey* const k = asked(key))
+    k->take(AskedKey::kInteger, static_cast<double>(lo), static_cast<double>(hi));
   const Value& value = need(key);
   std::int64_t x = 0;
   const char* end = value.text.data() + value.text.size();
@@ -91,9 +105,13 @@ std::int64_t Section::integer(std::string_view key, std::int64_t lo, std::int64_
   return x;
 }
 
-bool Section::flag(std::string_view key) { return choice(key, {"true", "false"}) == "true"; }
+bool Section::flag(std::string_view key) {
+  if (AskedKey* const k = asked(key)) k->kinds |= AskedKey::kFlag;
+  return chosen(key, {"true", "false"}) == "true";
+}
 
 std::string Section::text(std::string_view key) {
+  if (AskedKey* const k = asked(key)) k->kinds |= AskedKey::kText;
   const Value& value = need(key);
   if (value.kind != Value::Kind::kScalar)
     fail(key, fmt::format("is {}, want text", kindName(value)));
@@ -101,6 +119,7 @@ std::string Section::text(std::string_view key) {
 }
 
 std::vector<std::string> Section::texts(std::string_view key) {
+  if (AskedKey* const k = asked(key)) k->kinds |= AskedKey::kTexts;
   const Value& value = need(key);
   if (value.kind != Value::Kind::kList)
     fail(key, fmt::format("is {}, want a list", kindName(value)));
@@ -115,6 +134,14 @@ std::vector<std::string> Section::texts(std::string_view key) {
 }
 
 std::string Section::choice(std::string_view key, const std::vector<std::string_view>& allowed) {
+  if (AskedKey* const k = asked(key)) {
+    k->kinds |= AskedKey::kChoice;
+    k->choices.assign(allowed.begin(), allowed.end());
+  }
+  return chosen(key, allowed);
+}
+
+std::string Section::chosen(std::string_view key, const std::vector<std::string_view>& allowed) {
   const Value& value = need(key);
   if (value.kind != Value::Kind::kScalar ||
       std::find(allowed.begin(), allowed.end(), value.text) == allowed.end())
@@ -123,6 +150,10 @@ std::string Section::choice(std::string_view key, const std::vector<std::string_
 }
 
 Eigen::VectorXd Section::vector(std::string_view key, int size, double lo, double hi) {
+  if (AskedKey* const k = asked(key)) {
+    k->take(AskedKey::kVector, lo, hi);
+    k->cols.take(size);
+  }
   const Value& value = need(key);
   const auto n = static_cast<int>(value.children.size());
   const std::string want = size < 0 ? "at least one" : std::to_string(size);
@@ -138,6 +169,11 @@ Eigen::VectorXd Section::vector(std::string_view key, int size, double lo, doubl
 }
 
 Eigen::MatrixXd Section::matrix(std::string_view key, int rows, int cols, double lo, double hi) {
+  if (AskedKey* const k = asked(key)) {
+    k->take(AskedKey::kMatrix, lo, hi);
+    k->rows.take(rows);
+    k->cols.take(cols);
+  }
   const Value& value = need(key);
   if (rows < 0 && value.kind == Value::Kind::kList && !value.children.empty())
     rows = static_cast<int>(value.children.size());
@@ -161,22 +197,30 @@ Eigen::MatrixXd Section::matrix(std::string_view key, int rows, int cols, double
 }
 
 Section Section::section(std::string_view key) {
-  return {need(key), fmt::format("{}{}", path_.empty() ? "" : path_ + ".", key)};
+  AskedKey* const below = asked(key);
+  if (below) below->kinds |= AskedKey::kMap;
+  return {need(key), fmt::format("{}{}", path_.empty() ? "" : path_ + ".", key), below};
 }
 
 std::vector<Section> Section::list(std::string_view key) {
+  AskedKey* const below = asked(key);
+  if (below) below->kinds |= AskedKey::kList;
   const Value& value = need(key);
   if (value.kind != Value::Kind::kList)
     fail(key, fmt::format("is {}, want a list", kindName(value)));
+  AskedKey* const entry = below ? &below->keys["[]"] : nullptr;
+  if (entry) entry->kinds |= AskedKey::kMap;
   std::vector<Section> out;
   for (std::size_t i = 0; i < value.children.size(); ++i)
     out.emplace_back(value.children[i],
-                     fmt::format("{}{}[{}]", path_.empty() ? "" : path_ + ".", key, i));
+                     fmt::format("{}{}[{}]", path_.empty() ? "" : path_ + ".", key, i), entry);
   return out;
 }
 
 std::string Section::onlyKey(const std::vector<std::string_view>& allowed,
                              const std::vector<std::string_view>& besides) {
+  if (asked_) asked_->variants.assign(allowed.begin(), allowed.end());
+  for (const std::string_view key : allowed) asked(key);
   std::string found;
   for (const std::string& key : value_->keys) {
     if (std::find(besides.begin(), besides.end(), key) != besides.end()) continue;

@@ -67,12 +67,14 @@ std::string fingerprint(const std::string& text);
 /// YAML that parseDocument() reads back to the same document.
 std::string emit(const Value& document);
 
+struct AskedKey;
+
 /// A map on its way into a struct: knows its name, counts which keys were asked for.
 class Section {
  public:
-  /// `value` must outlive it.
-  Section(const Value& value, std::string path);
-  Section(Value&& value, std::string path) = delete;
+  /// `value` must outlive it, and `asked`, which is told of everything that is asked for.
+  Section(const Value& value, std::string path, AskedKey* asked = nullptr);
+  Section(Value&& value, std::string path, AskedKey* asked = nullptr) = delete;
 
   bool has(std::string_view key);
   /// It is there, and a list.
@@ -110,11 +112,14 @@ class Section {
 
  private:
   const Value& need(std::string_view key);
+  AskedKey* asked(std::string_view key);
+  std::string chosen(std::string_view key, const std::vector<std::string_view>& allowed);
   [[noreturn]] void failAt(const Value& at, const std::string& path, const std::string& what) const;
   double toNumber(const Value& value, const std::string& path, double lo, double hi) const;
 
   const Value* value_;
   std::string path_;
+  AskedKey* asked_;
   std::set<std::string, std::less<>> used_;
 };
 

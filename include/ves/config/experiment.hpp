@@ -113,6 +113,9 @@ Experiment loadExperiment(const std::filesystem::path& file,
 /// The same from a document that is in memory.
 Experiment buildExperiment(Value document, const std::vector<std::string>& overrides = {});
 
+/// Builds it for what its readers ask on the way.
+void askKeys(const Value& document, AskedKey& asked);
+
 /// Reads back what Experiment::resolved holds; `name` stands for a file name in messages.
 Experiment parseExperiment(const std::string& resolved, const std::string& name);
 
