@@ -74,6 +74,11 @@ TEST(Command, MoveRobotAndCollect) {
   EXPECT_EQ(load.body_T.mass, 2.5);
   EXPECT_NEAR(load.body_T.p_BoBcm_B.z(), 0.1, 1e-15);
   EXPECT_TRUE(std::holds_alternative<Release>(parseCommand("release", puma()).robot));
+  const auto push =
+      std::get<PushOrder>(parseCommand("push tool 20 0 -5 0.2 0 0 100", puma()).robot);
+  EXPECT_EQ(push, (PushOrder{PushOrder::On::kTool, Vec3(0, 0, 0.1), Vec3(20, 0, -5), 0.2}));
+  EXPECT_EQ(std::get<PushOrder>(parseCommand("push platform 1 2 3 4", puma()).robot),
+            (PushOrder{PushOrder::On::kPlatform, Vec3::Zero(), Vec3(1, 2, 3), 4.0}));
   const Command c = parseCommand("collect a.csv 5 20 z_ leg1", puma());
   EXPECT_EQ(c.collection.file, "a.csv");
   EXPECT_EQ(c.collection.rate, 20.0);
@@ -116,7 +121,11 @@ INSTANTIATE_TEST_SUITE_P(
         BadLine{"trajectory 3 z sine 10 0x10", "want a number in [0, 50] Hz"},
         BadLine{"move x", "x: missing"}, BadLine{"robot joint_7 1 1", "'joint_7', want one of"},
         BadLine{"robot joint_1 1e3 1", "joint_1: '1e3', want a number in"},
-        BadLine{"collect", "file: missing"}, BadLine{"arm now", "'now': one word too many"}));
+        BadLine{"push 1 2 3 4", "'1', want one of platform, tool, target"},
+        BadLine{"push tool 1 2 3 0", "seconds: '0', want a number in [0.001, 60] s"},
+        BadLine{"push tool 150 150 0 1", "a push of 212.1 N, want at most 200 N"},
+        BadLine{"push target 1 2 3 4", "there is no target"}, BadLine{"collect", "file: missing"},
+        BadLine{"arm now", "'now': one word too many"}));
 
 // --- Forms ---------------------------------------------------------------------------------------
 

@@ -85,7 +85,7 @@ TEST(Gate, LetsNothingOutOfRangeIn) {
   EXPECT_FALSE(back.rpy);
   EXPECT_EQ(back.speed, 0.1);
   for (const auto change : std::initializer_list<void (*)(robot_command_t&)>{
-           [](robot_command_t& m) { m.kind = 5; }, [](robot_command_t& m) { m.kind = -1; },
+           [](robot_command_t& m) { m.kind = 6; }, [](robot_command_t& m) { m.kind = -1; },
            [](robot_command_t& m) { m.duration = 1.0; }, [](robot_command_t& m) { m.speed = 0.0; },
            [](robot_command_t& m) { m.speed = NAN; }, [](robot_command_t& m) { m.speed = -0.1; },
            [](robot_command_t& m) { m.frame = 3; }, [](robot_command_t& m) { m.frame = -1; },
@@ -115,6 +115,25 @@ TEST(Gate, LetsNothingOutOfRangeIn) {
     EXPECT_FALSE(load_with(change));
   EXPECT_TRUE(
       std::holds_alternative<Release>(*fromMessage(toMessage(Release{}, header({1, 2}, 0, 0)))));
+  const PushOrder push{PushOrder::On::kTarget, Vec3(0.1, -0.2, 0.3), Vec3(20, -30, 40), 0.2};
+  const auto push_with = [&](auto change) {
+    robot_command_t m = toMessage(push, header({1, 2}, 0, 0));
+    change(m);
+    return fromMessage(m);
+  };
+  const auto same_push = push_with([](robot_command_t&) {});
+  ASSERT_TRUE(same_push);
+  EXPECT_EQ(std::get<PushOrder>(*same_push), push);
+  for (const auto change : std::initializer_list<void (*)(robot_command_t&)>{
+           [](robot_command_t& m) { m.on = 3; }, [](robot_command_t& m) { m.on = -1; },
+           [](robot_command_t& m) { m.force[0] = 196.0; },
+           [](robot_command_t& m) { m.force[1] = NAN; },
+           [](robot_command_t& m) { m.position[2] = INFINITY; },
+           [](robot_command_t& m) { m.position[2] = 1e9; },
+           [](robot_command_t& m) { m.duration = 0.0; },
+           [](robot_command_t& m) { m.duration = 61.0; },
+           [](robot_command_t& m) { m.duration = NAN; }})
+    EXPECT_FALSE(push_with(change));
   const auto order_with = [](auto change) {
     Order order;
     order.request = Request::kRun;

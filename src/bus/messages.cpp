@@ -16,7 +16,7 @@ namespace {
 
 // robot_command_t::kind and ::parts
 constexpr int kJointOrder = 0, kToolToOrder = 1, kToolByOrder = 2, kGraspOrder = 3,
-              kReleaseOrder = 4;
+              kReleaseOrder = 4, kPushOrder = 5;
 constexpr int kPositionPart = 1, kRpyPart = 2, kViaPart = 4;
 
 /// Field by field, as contract/schema.hpp has them.
@@ -112,6 +112,12 @@ robot_command_t toMessage(const RobotOrder& order, const header_t& header) noexc
     m.mass = hand->body_T.mass;
     Vec3::Map(m.com) = hand->body_T.p_BoBcm_B;
     Vec6::Map(m.inertia) << I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2);
+  } else if (const auto* push = std::get_if<PushOrder>(&order)) {
+    m.kind = kPushOrder;
+    m.on = static_cast<std::int32_t>(push->on);
+    m.duration = push->duration;
+    Vec3::Map(m.position) = push->point;
+    Vec3::Map(m.force) = push->force_I;
   } else {
     m.kind = kReleaseOrder;
   }
@@ -200,6 +206,9 @@ std::optional<RobotOrder> fromMessage(const robot_command_t& m) noexcept {
       return ifPlausible<RobotOrder>(HandOrder{body});
     }
     case kReleaseOrder: return Release{};
+    case kPushOrder:
+      return ifPlausible<RobotOrder>(PushOrder{
+          static_cast<PushOrder::On>(m.on), Vec3::Map(m.position), Vec3::Map(m.force), m.duration});
     default: return {};
   }
 }

@@ -304,6 +304,19 @@ std::string requireStability(Experiment& e) {
   return why;
 }
 
+std::string whyNotPushed(const Experiment& experiment, const PushOrder& order) {
+  if (!experiment.machine.simulated())
+    return "a push is for a machine that is all simulated; pieces of this one are real";
+  if (!(order.force_I.norm() <= kMostPush))
+    return fmt::format("a push of {:.4g} N, want at most {} N", order.force_I.norm(), kMostPush);
+  if (order.on == PushOrder::On::kTool && !experiment.robot.tool())
+    return "there is no robot with one tip to push";
+  const std::optional<World>& world = experiment.plant.task.world;
+  if (order.on == PushOrder::On::kTarget && !(world && world->environment.target))
+    return "there is no target to push in this scenario's environment";
+  return "";
+}
+
 Interaction interactionOf(const Experiment& experiment, std::int64_t& duration) {
   const Program& program = experiment.controller.program;
   const int segment = admittanceSegment(program);

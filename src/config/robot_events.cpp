@@ -82,7 +82,8 @@ void RobotEvents::read(Section& s, const Cue& cue) {
   constexpr std::pair<std::string_view, Read> kKinds[] = {{"joint", &RobotEvents::readJoint},
                                                           {"tool", &RobotEvents::readTool},
                                                           {"grasp", &RobotEvents::readGrasp},
-                                                          {"release", &RobotEvents::readRelease}};
+                                                          {"release", &RobotEvents::readRelease},
+                                                          {"push", &RobotEvents::readPush}};
   const auto* found = std::end(kKinds);
   for (const auto& kind : kKinds) {
     if (!s.has(kind.first)) continue;
@@ -90,8 +91,8 @@ void RobotEvents::read(Section& s, const Cue& cue) {
       s.fail(kind.first, fmt::format("beside {}, want only one of them", found->first));
     found = &kind;
   }
-  if (found == std::end(kKinds)) s.fail("joint", "missing, want it, tool, grasp or release");
-  if (robot_.frames.empty()) s.fail(found->first, "there is no robot");
+  if (found == std::end(kKinds)) s.fail("joint", "missing, want it, tool, grasp, release or push");
+  if (robot_.frames.empty() && found->first != "push") s.fail(found->first, "there is no robot");
   const std::int64_t end = std::llround(segmentOf(cue).duration * 1e9);
   if (end > 0 && cue.after >= end)
     s.fail("at_s",
@@ -215,6 +216,22 @@ void RobotEvents::readRelease(Section& s, const Cue& cue) {
   release.finish();
   moved(cue, Release{}, sinceStart(cue));
   tell(s, cue, delay, {cue, -1, {}});
+}
+
+void RobotEvents::readPush(Section& s, const Cue& cue) {
+  Section push = s.section("push");
+  PushOrder order;
+  const std::string on = push.choice("on", {kPushedNames[0], kPushedNames[1], kPushedNames[2]});
+  order.on = static_cast<PushOrder::On>(
+      std::find(std::begin(kPushedNames), std::end(kPushedNames), on) - std::begin(kPushedNames));
+  order.force_I = push.vector("force_n", 3, -kMostPush, kMostPush);
+  if (push.has("at_m")) order.point = push.vector("at_m", 3, -kFar, kFar);
+  push.finish();
+  order.duration = s.number("duration_s", kShortestPush, kLongestPush);
+  const std::string why = whyNotPushed(out_, order);
+  if (!why.empty()) s.fail("push", why);
+  const NamedFrame* tip = robot_.tool();
+  moved(cue, pushOf(order, tip ? tip->link : -1, tip ? tip->X_link : Transform()), sinceStart(cue));
 }
 
 /// `delay` [s] after the event; none: the controller is not told.

@@ -210,6 +210,23 @@ HandOrder load(Words& words, const Experiment& experiment) {
   return order;
 }
 
+PushOrder push(Words& words, const Experiment& experiment) {
+  PushOrder order;
+  const std::string on = words.word("platform, tool or target");
+  const auto at = std::find(std::begin(kPushedNames), std::end(kPushedNames), on);
+  if (at == std::end(kPushedNames))
+    throw InputError(fmt::format("'{}', want one of {}", on, fmt::join(kPushedNames, ", ")));
+  order.on = static_cast<PushOrder::On>(at - std::begin(kPushedNames));
+  for (int i = 0; i < 3; ++i)
+    order.force_I(i) =
+        words.number(std::string(wrenchComponent(i).name), -kMostPush, kMostPush, "N");
+  order.duration = words.number("seconds", kShortestPush, kLongestPush, "s");
+  if (!words.empty()) order.point = place(words);
+  const std::string why = whyNotPushed(experiment, order);
+  if (!why.empty()) throw InputError(why);
+  return order;
+}
+
 Collection collection(Words& words) {
   Collection c;
   c.file = words.word("file");
@@ -247,6 +264,8 @@ const std::vector<Item>& menu() {
        "lead its tool straight there (robot, platform, inertial)"},
       {Verb::kGrasp, "grasp", "KG [X Y Z]", "a load in the tool, its centre there"},
       {Verb::kRelease, "release", "", "let go of it"},
+      {Verb::kPush, "push", "platform|tool|target FX FY FZ SECONDS [X Y Z]",
+       "a force on the simulated machine, there"},
       {Verb::kCollect, "collect", "FILE [SECONDS [HZ [NAME...]]]", "variables to a CSV file"},
       {Verb::kStatus, "status", "", "where everything is"},
       {Verb::kHold, "hold", "", "brake and stay"},
@@ -322,6 +341,7 @@ void parseArguments(Words& words, const Experiment& experiment, Command& command
     case Verb::kTool: command.robot = toolPath(words, experiment); break;
     case Verb::kGrasp: command.robot = load(words, experiment); break;
     case Verb::kRelease: command.robot = Release{}; break;
+    case Verb::kPush: command.robot = push(words, experiment); break;
     case Verb::kCollect: command.collection = collection(words); break;
     case Verb::kWait: command.wait = words.seconds(); break;
     case Verb::kStatus:

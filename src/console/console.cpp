@@ -15,10 +15,10 @@
 #include "ves/console/command.hpp"
 #include "ves/console/form.hpp"
 #include "ves/core/coordinates.hpp"
-#include "ves/realtime/realtime.hpp"
 #include "ves/evaluation/evidence.hpp"
-#include "ves/series/series.hpp"
+#include "ves/realtime/realtime.hpp"
 #include "ves/run/session.hpp"
+#include "ves/series/series.hpp"
 
 namespace ves {
 namespace {
@@ -117,7 +117,8 @@ class Console {
       if (status == CalibrationStatus::kDone) keepCalibration(s);
       if (status == CalibrationStatus::kRefused) {
         failed_ = failed_ || !script_.empty();
-        say(fmt::format("calibration refused: {}; the bias is as before", stillnessViolation(s, experiment_)));
+        say(fmt::format("calibration refused: {}; the bias is as before",
+                        stillnessViolation(s, experiment_)));
       }
     }
   }
@@ -215,7 +216,8 @@ class Console {
       case Verb::kRobot:
       case Verb::kTool:
       case Verb::kGrasp:
-      case Verb::kRelease: session_->orderRobot(command.robot); break;
+      case Verb::kRelease:
+      case Verb::kPush: session_->orderRobot(command.robot); break;
       case Verb::kQuit: return false;
       default: return give(command);
     }

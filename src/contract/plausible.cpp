@@ -73,6 +73,12 @@ bool plausible(const HandOrder& order) {
 
 bool plausible(const Release&) { return true; }
 
+bool plausible(const PushOrder& order) {
+  return inRange(static_cast<int>(order.on), 0, 2) && within(order.point, kMaxReach) &&
+         within(order.force_I, kMostPush) && order.force_I.norm() <= kMostPush &&
+         inRange(order.duration, kShortestPush, kLongestPush);
+}
+
 bool plausible(const VehicleOrder& order) {
   for (const double factor : {order.to.mass, order.to.damping, order.to.stiffness})
     if (!(factor == 0.0 || inRange(factor, kLeastVehicleFactor, kMostVehicleFactor))) return false;

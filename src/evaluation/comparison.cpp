@@ -101,7 +101,8 @@ Vec6 restOf(const ModalModel& base, const Vec6& x) {
 }  // namespace
 
 std::optional<Motion> baseMotion(const Experiment& e, const Vec6& start,
-                                 ReferenceMotions& references) {
+                                 ReferenceMotions& references,
+                                 const std::vector<TimedAction>* pushes) {
   if (!wantsAdmittance(e.controller.program) ||
       e.controller.admittance.stiffness.size() > kMostComparedModes)
     return {};
@@ -109,6 +110,13 @@ std::optional<Motion> baseMotion(const Experiment& e, const Vec6& start,
   Interaction interaction = interactionOf(e, duration);
   const Eigen::VectorXd eta = leastSquares(interaction.base.Phi, start);
   interaction.rest = restOf(interaction.base, start);
+  if (pushes) {
+    std::erase_if(interaction.actions,
+                  [](const TimedAction& one) { return std::holds_alternative<Push>(one.action); });
+    interaction.actions.insert(interaction.actions.end(), pushes->begin(), pushes->end());
+    std::stable_sort(interaction.actions.begin(), interaction.actions.end(),
+                     [](const TimedAction& a, const TimedAction& b) { return a.start < b.start; });
+  }
   return *references.of(interaction, e.controller.period, duration, eta);
 }
 
@@ -130,12 +138,35 @@ std::string whyNotCompared(const Series& series) {
   return "";
 }
 
+std::vector<TimedAction> pushesOf(const Series& series) {
+  std::vector<TimedAction> out;
+  std::optional<std::int64_t> start;  // [ns] by the machine's clock
+  int seen = 0;
+  for (const Row& row : series.rows) {
+    if (!inAdmittance(row.state) || !row.has_truth) continue;
+    const truth_t& m = row.truth;
+    if (!start) start = row.state.machine_time_ns;
+    if (m.pushes <= seen) continue;
+    seen = m.pushes;
+    // One may last from before.
+    const std::int64_t begun = m.push_began_ns - *start;
+    const double before = static_cast<double>(std::max<std::int64_t>(0, -begun));
+    const double rest = m.push_duration - before * kSecondPerNanosecond;
+    if (rest > 0.0)
+      out.push_back({std::max<std::int64_t>(0, begun),
+                     Push{static_cast<Push::On>(m.push_on), m.push_link, Vec3::Map(m.push_point),
+                          Vec3::Map(m.push_force), rest}});
+  }
+  return out;
+}
+
 std::optional<Emulation> emulation(const Series& series, ReferenceMotions& references) {
   if (!whyNotCompared(series).empty()) return {};
   Emulation out;
   out.platform = actual(series);
   if (out.platform.x.size() < 2) return {};
-  const auto base = baseMotion(series.experiment, commanded(series).x.front(), references);
+  const std::vector<TimedAction> pushes = pushesOf(series);
+  const auto base = baseMotion(series.experiment, commanded(series).x.front(), references, &pushes);
   if (!base) return {};
   out.base = *base;
   return out;

@@ -21,6 +21,7 @@ struct NameOf {
   std::string operator()(const Grasp&) const { return "grasp"; }
   std::string operator()(const GraspTarget&) const { return "grasp"; }
   std::string operator()(const Release&) const { return "release"; }
+  std::string operator()(const Push&) const { return "push"; }
 };
 
 }  // namespace

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace ves::plant {
 namespace {
@@ -112,6 +113,7 @@ void Plant::startRobotEvents() noexcept {
 }
 
 bool Plant::moveRobot(const RobotAction& action) noexcept {
+  if (const auto* finger = std::get_if<Push>(&action)) return push(*finger);
   if (std::holds_alternative<GraspTarget>(action))
     return config_.task.world && !robot_.holds() &&
            grasp(config_.task.world->environment, toolMotion(), truth_.target);
@@ -123,6 +125,17 @@ bool Plant::moveRobot(const RobotAction& action) noexcept {
   return robot_.begin(action, now_);
 }
 
+bool Plant::push(const Push& push) noexcept {
+  const bool there = push.on == Push::On::kTarget
+                         ? config_.task.world && config_.task.world->environment.target
+                         : push.link >= -1 && push.link < robot_.model().size;
+  if (!there) return false;
+  if (truth_.push) stepMechanics();  // what it pushed so far
+  truth_.push = BegunPush{push, now_};
+  ++truth_.pushes;
+  return true;
+}
+
 double Climate::at(double t) const noexcept {
   return mean + 0.5 * swing * std::sin(2.0 * M_PI * (t - rising) / period);
 }
@@ -130,6 +143,7 @@ double Climate::at(double t) const noexcept {
 /// No valve is open, no joint is on its way, and nothing is planned.
 bool Plant::still() const noexcept {
   if (next_robot_event_ != kNever || config_.task.world) return false;
+  if (truth_.push && truth_.push->end() + kSettle > now_) return false;
   for (std::size_t i = 0; i < kLegs; ++i)
     if (slaves_[i].code() != 0 || std::abs(actuators_[i].velocity()) > kStillSpeed) return false;
   return !robot_.moving(now_);
@@ -229,6 +243,13 @@ Wrench Plant::meetWorld(double dt) noexcept {
   const bool held = world.release >= 0 && began_[static_cast<std::size_t>(world.release)] == kNever;
   Floating target = truth_.target;
   if (held) target.v = target.w = Vec3::Zero();
+  if (truth_.push && truth_.push->push.on == Push::On::kTarget) {
+    const Wrench on_target_Bo_I = pushed(last_step_ - std::llround(dt * 1e9));
+    const FloatingRates with = rates(world.environment, target, on_target_Bo_I),
+                        without = rates(world.environment, target, Wrench{});
+    target.v += dt * (with.v - without.v);
+    target.w += dt * (with.w - without.w);
+  }
   const Touch mean = ves::advance(world.environment, tool_, now, seconds(last_step_) - dt, dt,
                                   kContactStep, target, truth_.contacts);
   if (!held) truth_.target = target;
@@ -237,6 +258,17 @@ Wrench Plant::meetWorld(double dt) noexcept {
   truth_.clearance = mean.least;
   const Transform X_IS = truth_.P.X * config_.payload.X_PS;
   return rotate(X_IS.R.transpose(), shift(mean.on_tool_To_I, X_IS.p - now.X.p));
+}
+
+/// The push's mean since `from` [ns], in {I}: about Po, or about the centre of what floats.
+Wrench Plant::pushed(std::int64_t from) const noexcept {
+  const Push& push = truth_.push->push;
+  const Vec3 f = truth_.push->share(from, now_) * push.force_I;
+  const Transform X_IB = truth_.target.X_IB();
+  const Vec3 at =
+      pushedPoint(push, truth_.P.X, config_.payload.X_PL0(), robot_.model(), truth_.joints.q, X_IB);
+  const Vec3 about = push.on == Push::On::kTarget ? X_IB.p : truth_.P.X.p;
+  return {f, (at - about).cross(f)};
 }
 
 /// F_L0o_L0. A robot that stands is one body.
@@ -277,8 +309,8 @@ LegMotion Plant::legOutputs(double dt) noexcept {
 /// Brings platform, robot and sensor from the last step to now.
 void Plant::stepMechanics() noexcept {
   if (now_ <= last_step_) return;
-  const double dt = seconds(now_ - last_step_);
-  last_step_ = now_;
+  const std::int64_t before = std::exchange(last_step_, now_);
+  const double dt = seconds(now_ - before);
 
   const LegMotion legs = legOutputs(dt);
   Transform guess = truth_.P.X;
@@ -291,6 +323,10 @@ void Plant::stepMechanics() noexcept {
 
   Wrench F_So_S = sensorLoad();
   if (config_.task.world) F_So_S = F_So_S + meetWorld(dt);
+  if (truth_.push && truth_.push->push.on != Push::On::kTarget) {
+    const Transform X_IS = truth_.P.X * config_.payload.X_PS;
+    F_So_S = F_So_S + rotate(X_IS.R.transpose(), shift(pushed(before), X_IS.p - truth_.P.X.p));
+  }
   // Behind Filter 3 the acceleration is smooth again, and known at the end of the step.
   const auto over = config_.filters == LegFilters::kNone ? ForceTorqueSensor::Over::kConstant
                                                          : ForceTorqueSensor::Over::kRamp;

@@ -10,6 +10,12 @@ RobotOrders::RobotOrders(const Experiment& experiment) : experiment_(experiment)
 std::optional<RobotAction> RobotOrders::take(const RobotOrder& order, const plant::Truth& truth) {
   if (const auto* move = std::get_if<RobotMove>(&order)) return *move;
   if (std::holds_alternative<Release>(order)) return Release{};
+  if (const auto* push = std::get_if<PushOrder>(&order)) {
+    const std::string why = whyNotPushed(experiment_, *push);
+    if (!why.empty()) throw InputError(why);
+    const NamedFrame* tool = experiment_.robot.tool();
+    return pushOf(*push, tool ? tool->link : -1, tool ? tool->X_link : Transform());
+  }
   const UrdfRobot& robot = experiment_.robot;
   const NamedFrame* frame = robot.tool();
   if (!frame) throw InputError("the robot has no tip, want tip: LINK in its configuration");

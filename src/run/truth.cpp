@@ -41,6 +41,14 @@ truth_t toMessage(const plant::Truth& truth, const header_t& header) noexcept {
   schema::put(truth.target.v, m.target_v);
   schema::put(truth.target.w, m.target_w);
   m.gripped = truth.target.X_TB ? 1 : 0;
+  m.pushes = truth.pushes;
+  const BegunPush push = truth.push.value_or(BegunPush{});
+  m.push_on = static_cast<std::int32_t>(push.push.on);
+  m.push_link = push.push.link;
+  schema::put(push.push.point, m.push_point);
+  schema::put(push.push.force_I, m.push_force);
+  m.push_began_ns = push.began + header.time_ns - truth.time;
+  m.push_duration = push.push.duration;
   return m;
 }
 

@@ -288,6 +288,15 @@ std::vector<Column> columns(const Experiment& experiment) {
           },
           "where the tool truly is, in inertial axes");
   }
+  for (int i = 0; i < 3; ++i)
+    truth(
+        fmt::format("push_{}_n", wrenchComponent(i).name),
+        [i](const truth_t& m) {
+          const double since =
+              static_cast<double>(m.header.time_ns - m.push_began_ns) * kSecondPerNanosecond;
+          return m.pushes > 0 && since < m.push_duration ? m.push_force[i] : 0.0;
+        },
+        "of the push that lasts, in inertial axes");
   if (experiment.plant.task.world) {
     truth(
         "clearance_m", [](const truth_t& m) { return m.clearance; },

@@ -60,6 +60,10 @@ class Equations {
     }
   }
   void begin(const RobotAction& action, const VectorXd& y) {
+    if (const auto* push = std::get_if<Push>(&action)) {
+      push_ = BegunPush{*push, now_};
+      return;
+    }
     if (std::holds_alternative<GraspTarget>(action)) {
       Floating target = floating(y);
       if (interaction_.world &&
@@ -70,6 +74,11 @@ class Equations {
     } else {
       robot_.begin(action, now_);
     }
+  }
+
+  /// [ns] when the push ends that lasts now; `otherwise`: none does.
+  std::int64_t pushEnds(std::int64_t otherwise) const {
+    return pushing() ? std::min(otherwise, push_->end()) : otherwise;
   }
 
   void derivative(double later, const VectorXd& y, VectorXd& dy) const {
@@ -83,13 +92,25 @@ class Equations {
       split(q, eta_dot, A, right);
     else
       whole(q, y, A, right);
+    Wrench on_target_Bo_I;
+    if (pushing()) {
+      const BodyMotion P = platform(y);
+      const Push& push = push_->push;
+      const Transform X_IB = interaction_.world ? floating(y).X_IB() : Transform();
+      const Vec3 at = pushedPoint(push, P.X, X_PL0_, robot_.model(), q.q, X_IB);
+      if (push.on == Push::On::kTarget)
+        on_target_Bo_I = {push.force_I, (at - X_IB.p).cross(push.force_I)};
+      else
+        right += jacobian(y).transpose() *
+                 Wrench{push.force_I, (at - P.X.p).cross(push.force_I)}.stacked();
+    }
     if (interaction_.world) {
       const BodyMotion P = platform(y);
       const FrameMotion tool = toolMotion(q, P);
       const Touch touched = touch(interaction_.world->environment, tool, floating(y));
       right += jacobian(y).transpose() * shift(touched.on_tool_To_I, P.X.p - tool.X.p).stacked();
-      const FloatingRates f =
-          rates(interaction_.world->environment, floating(y), touched.on_target_Bo_I);
+      const FloatingRates f = rates(interaction_.world->environment, floating(y),
+                                    touched.on_target_Bo_I + on_target_Bo_I);
       dy.tail<kFloating>() << f.p, f.q, f.v, f.w;
     }
     dy.segment(k, k) = solvePositive(A, right);
@@ -125,6 +146,8 @@ class Equations {
 
  private:
   static constexpr int kFloating = 13;
+
+  bool pushing() const { return push_ && now_ < push_->end(); }
 
   Floating floating(const VectorXd& y) const {
     const Eigen::Matrix<double, kFloating, 1> f = y.tail<kFloating>();
@@ -200,6 +223,7 @@ class Equations {
   RigidBody held_;
   std::optional<Transform> X_TB_;  // of the target, in the tool's grip
   ContactWatch contacts_;
+  std::optional<BegunPush> push_;
 };
 
 /// The interval of `over` [s], step by step: every one is seen, and ends where the tool begins or
@@ -292,6 +316,7 @@ std::vector<InteractionPoint> simulate(const Interaction& interaction,
         equations.begin(next->action, y);
       std::int64_t until = end;
       if (next != interaction.actions.end()) until = std::min(until, next->start);
+      until = equations.pushEnds(until);
       double later = 0.0;
       gsl_odeiv2_driver_reset(driver.get());
       const double over = static_cast<double>(until - now) * kSecondPerNanosecond;

@@ -19,6 +19,9 @@ void requireGood(const RobotOrder& order) {
   }
   if (const auto* hand = std::get_if<HandOrder>(&order))
     fuzz::require(hand->body_T.mass >= 0.0 && hand->body_T.I_Bcm_B.allFinite());
+  if (const auto* push = std::get_if<PushOrder>(&order))
+    fuzz::require(push->force_I.norm() <= kMostPush && push->point.allFinite() &&
+                  push->duration > 0.0 && push->duration <= kLongestPush);
 }
 
 void message(const std::uint8_t* data, std::int64_t size) {

@@ -133,6 +133,11 @@ std::string drawRobot(Dice& dice, const Experiment& e) {
   const int what = dice.whole(0, 9);
   if (e.robot.tool() && what == 0) return fmt::format("grasp {:.1f}", dice.between(0.1, 5.0));
   if (e.robot.tool() && what == 1) return "release";
+  if (what == 3)
+    return fmt::format("push {} {:.0f} {:.0f} {:.0f} {:.2f}",
+                       e.robot.tool() && dice.chance(0.5) ? "tool" : "platform",
+                       dice.between(-60.0, 60.0), dice.between(-60.0, 60.0),
+                       dice.between(-60.0, 60.0), dice.between(0.05, 1.0));
   if (e.robot.tool() && what == 2)
     return fmt::format("tool by {:.0f} {:.0f} {:.0f} {:.1f}", dice.between(-50.0, 50.0),
                        dice.between(-50.0, 50.0), dice.between(-50.0, 50.0),

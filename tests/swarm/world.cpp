@@ -354,7 +354,8 @@ class World {
       ether_.send(channel, buffer.data(), static_cast<std::size_t>(size));
     };
     if (command.verb == Verb::kRobot || command.verb == Verb::kTool ||
-        command.verb == Verb::kGrasp || command.verb == Verb::kRelease) {
+        command.verb == Verb::kGrasp || command.verb == Verb::kRelease ||
+        command.verb == Verb::kPush) {
       robot_command_t message = toMessage(command.robot, h);
       message.machine = machine_ ? machine_->id.source : 0;
       send(channel::kRobot, message);

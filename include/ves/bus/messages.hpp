@@ -24,7 +24,7 @@
 namespace ves {
 
 /// Of all messages and of the columns of series.csv; readers refuse others.
-inline constexpr std::int32_t kSchema = 8;
+inline constexpr std::int32_t kSchema = 9;
 
 /// Who sends, and since when.
 struct Identity {

@@ -128,6 +128,9 @@ std::string applyStabilityCheck(Experiment& experiment);
 /// nobody forces it.
 std::string requireStability(Experiment& experiment);
 
+/// Why the machine is not pushed so; empty: it is.
+std::string whyNotPushed(const Experiment& experiment, const PushOrder& order);
+
 /// Robot and base of the program's first admittance segment, from its start, for the simulation of
 /// chapter 3; `duration` [ns] of the segment. Throws InputError when there is none.
 Interaction interactionOf(const Experiment& experiment, std::int64_t& duration);

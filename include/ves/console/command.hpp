@@ -24,6 +24,7 @@ enum class Verb {
   kTool,
   kGrasp,
   kRelease,
+  kPush,
   kCollect,
   kStatus,
   kHold,
@@ -59,7 +60,7 @@ struct Command {
   Order order;            // of what moves the platform
   Collection collection;  // of kCollect
   double wait = 0.0;      // [s] of kWait
-  RobotOrder robot;       // of kRobot, kTool, kGrasp and kRelease
+  RobotOrder robot;       // of kRobot, kTool, kGrasp, kRelease and kPush
 };
 
 /// A number in [lo, hi]. Throws InputError that says so.

@@ -44,6 +44,22 @@ struct Release {
   bool operator==(const Release&) const = default;
 };
 
-using RobotOrder = std::variant<RobotMove, ToolOrder, HandOrder, Release>;
+/// A finger on the simulated machine: a force in inertial axes, on what the sensor carries or on
+/// what floats before the tool. A new push takes the place of one that lasts.
+struct PushOrder {
+  enum class On { kPlatform, kTool, kTarget };
+
+  On on = On::kTool;
+  Vec3 point = Vec3::Zero();    // [m] that moves with the body: in {P}, {T}, or the target's frame
+  Vec3 force_I = Vec3::Zero();  // [N]
+  double duration = 0.0;        // [s]
+
+  bool operator==(const PushOrder&) const = default;
+};
+inline constexpr std::string_view kPushedNames[] = {"platform", "tool", "target"};
+inline constexpr double kMostPush = 200.0;                          // [N] that a person pushes
+inline constexpr double kShortestPush = 1e-3, kLongestPush = 60.0;  // [s]
+
+using RobotOrder = std::variant<RobotMove, ToolOrder, HandOrder, Release, PushOrder>;
 
 }  // namespace ves

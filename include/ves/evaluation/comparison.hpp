@@ -88,9 +88,14 @@ class ReferenceMotions {
 
 /// The robot on its base in free space, in the first admittance segment of the program, let go at
 /// `start` from home: a point a tick. None without admittance control, where so many modes are kept
-/// that it would take longer than the run, and where the motion grows without bound.
+/// that it would take longer than the run, and where the motion grows without bound. `pushes` that
+/// there were take the place of the program's.
 std::optional<Motion> baseMotion(const Experiment& experiment, const Vec6& start,
-                                 ReferenceMotions& references);
+                                 ReferenceMotions& references,
+                                 const std::vector<TimedAction>* pushes = nullptr);
+
+/// Pushes on the machine in the first admittance segment, the program's and others, since it began.
+std::vector<TimedAction> pushesOf(const Series& series);
 
 /// Whether the vehicle is the configuration's, which an order may have changed.
 bool ofConfiguredVehicle(const state_t& state) noexcept;

@@ -80,10 +80,12 @@ struct Truth {
   double clearance = HUGE_VAL;  // [m] of the tool from the nearest surface, least in it
   Floating target;              // the body that floats
   ContactWatch contacts;
-  LegMotion legs;               // of the actuators, unfiltered
-  Vec6 current = Vec6::Zero();  // [A] valves
-  bool legs_agree = true;       // forward kinematics found a pose
-  bool parking = false;         // the LegSlaves go home by themselves
+  std::optional<BegunPush> push;  // the last one
+  int pushes = 0;                 // [-] so far
+  LegMotion legs;                 // of the actuators, unfiltered
+  Vec6 current = Vec6::Zero();    // [A] valves
+  bool legs_agree = true;         // forward kinematics found a pose
+  bool parking = false;           // the LegSlaves go home by themselves
 };
 
 class Plant {
@@ -133,6 +135,8 @@ class Plant {
   void startRobotEvents() noexcept;
   Wrench sensorLoad() noexcept;
   FrameMotion toolMotion() const noexcept;
+  bool push(const Push& push) noexcept;
+  Wrench pushed(std::int64_t from) const noexcept;
   Wrench meetWorld(double dt) noexcept;
   Wrench wrenchOnRobot(const ProperMotion& L0) noexcept;
   LegMotion legOutputs(double dt) noexcept;
