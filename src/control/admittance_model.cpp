@@ -238,6 +238,10 @@ void AdmittanceModel::step(const Wrench& F_Po_I, double damping) noexcept {
                    ? dynamics_.advance(dynamics_.body(Mat6::Zero()), period_, before_.modes, u)
                    : dynamics_.advance(step_, before_.modes, u);
   now_.motion = at(now_.modes, dynamics_.acceleration(now_.modes, u));
+  if (damped() < 0.0) {
+    now_ = before_;
+    step(F_Po_I, 0.0);
+  }
 }
 
 void AdmittanceModel::step(const Wrench& F_Po_I, const Mat6& M_1, double dt, double ahead,
@@ -255,6 +259,10 @@ void AdmittanceModel::step(const Wrench& F_Po_I, const Mat6& M_1, double dt, dou
   now_.modes = dynamics_.advance(body, dt, before_.modes, u);
   const Modes later = dynamics_.advance(body, ahead, now_.modes, u);
   now_.motion = at(later, dynamics_.acceleration(body, later, u));
+  if (damped() < 0.0) {
+    now_ = before_;
+    step(F_Po_I, M_1, dt, ahead, 0.0);
+  }
 }
 
 PathPoint<6> AdmittanceModel::at(

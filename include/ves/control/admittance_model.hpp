@@ -127,7 +127,7 @@ class AdmittanceModel {
   void reset(const Vec6& x, const Mat6& M_1 = Mat6::Zero(), double ahead = 0.0) noexcept;
 
   /// (C.6): the state one period after W began to act. `damping` [1/s] acts on every mode besides,
-  /// held with W.
+  /// held with W; not in a step in which the vehicle turns round, and it would push.
   void step(const Wrench& F_Po_I, double damping = 0.0) noexcept;
 
   /// The same `dt` [s] after, with a rigid body M_1 on the base whose inertia is not in F_Po_I:
