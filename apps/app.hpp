@@ -158,6 +158,12 @@ struct Options {
     addJoin(cli, join);
     cli.get_option("--join")->excludes(alone);
   }
+  /// After addBus().
+  void addPace(CLI::App& cli) {
+    cli.add_option("--pace", process.pace, "[-] of real time, in lockstep; `view` changes it")
+        ->check(inRange(1e-3, kMostPace))
+        ->needs(cli.get_option("--lockstep"));
+  }
   /// Before any thread starts.
   void enterBus() const {
     if (private_bus) enterPrivateBus();

@@ -15,6 +15,7 @@ int demoCommand(int argc, char** argv) {
   options.scenario = "puma_on_table_4_1";
   options.addOut(cli);
   options.addBus(cli);
+  options.addPace(cli);
   options.addQuiet(cli);
   options.addView(cli);
   return run(cli, argc, argv, [&] { return runExperiment(options); });

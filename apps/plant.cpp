@@ -14,6 +14,7 @@ int plantCommand(int argc, char** argv) {
   Options options;
   options.addExperiment(cli);
   options.addBus(cli);
+  options.addPace(cli);
   return run(cli, argc, argv, [&] {
     const Experiment experiment = options.load();
     options.enterBus();

@@ -31,6 +31,7 @@ int runCommand(int argc, char** argv) {
   cli.get_option("scenario")->required(false);
   options.addForce(cli);
   options.addBus(cli);
+  options.addPace(cli);
   options.addOut(cli);
   cli.add_flag("--two-processes", options.two_processes, "in lockstep too, over the bus");
   options.addQuiet(cli);

@@ -4,14 +4,15 @@
 #pragma once
 
 #include <fmt/chrono.h>
+#include <poll.h>
 
 #include <fstream>
 
 #include "app.hpp"
+#include "ves/page/web_server.hpp"
 #include "ves/realtime/realtime.hpp"
 #include "ves/results/results.hpp"
 #include "ves/run/process.hpp"
-#include "ves/page/web_server.hpp"
 
 namespace ves::app {
 
@@ -76,24 +77,51 @@ inline int statusOf(const RunResult& result) {
   return result.good() ? kDone : kTripped;
 }
 
-/// `ves view` on a socket of this network, for a bus that may be in another.
-inline std::unique_ptr<Process> startView(const Listener& listener, const std::string& url) {
-  setenv(kViewToken, listener.token.c_str(), 1);
-  fcntl(listener.descriptor, F_SETFD, 0);
-  auto view = std::make_unique<Process>(
-      ownProgram(), std::vector<std::string>{"view", "--url", url, "--listener",
-                                             std::to_string(listener.descriptor)});
-  unsetenv(kViewToken);
-  close(listener.descriptor);
-  fmt::print("watch it at {}\n", listener.url());
-  std::fflush(stdout);
-  return view;
-}
+/// `ves view` on a socket of this network, for a bus that may be in another. Waits until a browser
+/// has opened the page, so that nobody misses the beginning.
+class ViewBeside {
+ public:
+  explicit ViewBeside(const std::string& url) : listener_(listenOn("127.0.0.1", {})), url_(url) {}
+
+  /// Once the bus is entered.
+  void start() {
+    int ends[2];
+    if (pipe2(ends, O_CLOEXEC) != 0) throw InputError("--view: no pipe to be had");
+    setenv(kViewToken, listener_.token.c_str(), 1);
+    for (const int fd : {listener_.descriptor, ends[1]}) fcntl(fd, F_SETFD, 0);
+    process_ = std::make_unique<Process>(
+        ownProgram(), std::vector<std::string>{"view", "--url", url_, "--listener",
+                                               std::to_string(listener_.descriptor), "--ready",
+                                               std::to_string(ends[1])});
+    unsetenv(kViewToken);
+    close(listener_.descriptor);
+    close(ends[1]);
+    fmt::print("watch it at {}\n", listener_.url());
+    std::fflush(stdout);
+    waitFor(ends[0]);
+    close(ends[0]);
+  }
+
+ private:
+  static void waitFor(int ready) {
+    constexpr int kPatience = 60;  // [s]
+    fmt::print(stderr, "it begins when a browser has opened that page, in {} s at the latest\n",
+               kPatience);
+    const std::int64_t until = monotonicNow() + kPatience * 1'000'000'000LL;
+    pollfd wait{ready, POLLIN, 0};
+    while (!stop_requested && monotonicNow() < until && poll(&wait, 1, 100) == 0) {
+    }
+  }
+
+  Listener listener_;
+  std::string url_;
+  std::unique_ptr<Process> process_;
+};
 
 inline int runExperiment(RunnerOptions& options) {
-  const bool one_process = options.process.lockstep && !options.two_processes;
-  if (options.view && one_process)
-    throw InputError("--view: a run in lockstep is over too soon; want ves view LOG afterwards");
+  if (options.process.lockstep && options.view && !options.process.pace) options.process.pace = 1.0;
+  const bool one_process =
+      options.process.lockstep && !options.two_processes && !options.process.pace;
   Experiment experiment = options.load();
   printWarnings(experiment, options.verbose);
   warnOfInstability(experiment);
@@ -102,7 +130,7 @@ inline int runExperiment(RunnerOptions& options) {
 
   Progress progress(experiment);
   RunResult result;
-  std::unique_ptr<Process> view;
+  std::optional<ViewBeside> view;
   if (one_process) {
     LogWriter writer(launch.process.log);
     result = runLockstep(experiment, &writer, [&](const TickState& state) {
@@ -112,10 +140,9 @@ inline int runExperiment(RunnerOptions& options) {
       return stop_requested ? Order{Request::kStop, {}, {}} : Order();
     });
   } else {
-    std::optional<Listener> listener;
-    if (options.view) listener = listenOn("127.0.0.1", {});
+    if (options.view) view.emplace(options.process.url);  // browsers are not on a private bus
     prepareBus(options, true);
-    if (listener) view = startView(*listener, options.process.url);
+    if (view) view->start();
     launch.process.start = true;
     result = runProcesses(
         experiment, launch,

@@ -3,6 +3,7 @@
 // ves view: a run in a browser, as it happens or from its log; or a log as one file.
 #include "app.hpp"
 #include "commands.hpp"
+#include "ves/page/film.hpp"
 #include "ves/page/live_run.hpp"
 #include "ves/page/page.hpp"
 #include "ves/page/scene.hpp"
@@ -14,13 +15,24 @@ namespace {
 
 struct ViewOptions {
   std::vector<std::string> logs;
-  std::string html, svg, scenario;
+  std::string html, svg, video, png, scenario;
+  FilmOptions film;
+  double at = 0.0;  // [s] of --png
   MovingOptions moving{0.0, 1e9, 8.0};
   std::optional<double> rate;
   std::string url = kDefaultUrl, join, address = "127.0.0.1";
   std::optional<int> port;
-  int listener = -1;
+  int listener = -1, ready = -1;
+  std::string results;
 };
+
+/// A run's folder stands for the log in it.
+std::string nameOfLog(const std::string& log) {
+  const std::filesystem::path path(log);
+  return path.filename() == "run.lcmlog" && path.has_parent_path()
+             ? path.parent_path().filename().string()
+             : path.filename().string();
+}
 
 std::string recordedPage(const ViewOptions& options, double rate) {
   std::vector<nlohmann::ordered_json> recordings;
@@ -28,6 +40,7 @@ std::string recordedPage(const ViewOptions& options, double rate) {
     const Series series = seriesOf(log, options.scenario);
     std::vector<std::string> warnings;
     recordings.push_back(recording(series, rate, warnings));
+    recordings.back()["scene"]["label"] = nameOfLog(log);
     for (const std::string& warning : warnings) fmt::print(stderr, "warning: {}\n", warning);
   }
   return page(recordings);
@@ -39,6 +52,51 @@ int writePage(const ViewOptions& options) {
   writeGiven("--html", options.html, text);
   fmt::print("{} ({:.1f} MB): open it in a browser\n", options.html,
              static_cast<double>(text.size()) * 1e-6);
+  return kDone;
+}
+
+/// The page in a file of its own while it is filmed.
+class PageFile {
+ public:
+  explicit PageFile(const std::string& text)
+      : path_(std::filesystem::temp_directory_path() / fmt::format("ves-page-{}.html", getpid())) {
+    writeGiven("page", path_.string(), text);
+  }
+  ~PageFile() {
+    std::error_code error;
+    std::filesystem::remove(path_, error);
+  }
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+int writeFilm(ViewOptions options) {
+  options.film.from = options.moving.from;
+  options.film.to = options.moving.to;
+  options.film.rate = options.rate.value_or(options.film.rate);
+  catchSignals();
+  const PageFile page(recordedPage(options, options.film.rate / options.film.speed));
+  const bool terminal = isatty(STDERR_FILENO);
+  int done = 0;
+  film(page.path(), options.video, options.film, [&](int count, int of) {
+    if (terminal) fmt::print(stderr, "\rpicture {} of {}", count, of);
+    done = count;
+    return stop_requested == 0;
+  });
+  if (terminal) fmt::print(stderr, "\r{:40}\r", "");
+  fmt::print("{}: {} pictures, {:.1f} s ({:.1f} MB)\n", options.video, done,
+             done / options.film.rate,
+             static_cast<double>(std::filesystem::file_size(options.video)) * 1e-6);
+  return kDone;
+}
+
+int writePrint(const ViewOptions& options) {
+  constexpr double kEveryTick = 1000.0;  // [1/s]
+  const PageFile page(recordedPage(options, kEveryTick));
+  writeGiven("--png", options.png, print(page.path(), options.at, options.film));
+  fmt::print("{}: 300 dots an inch\n", options.png);
   return kDone;
 }
 
@@ -77,8 +135,13 @@ int servePage(const ViewOptions& options) {
     std::fflush(stdout);
   }
   if (live) server.watch(live->descriptor(), [] {});
+  int ready = options.ready;
   while (!stop_requested) {
     server.serve(50);
+    if (ready >= 0 && server.pages() > 0) {  // who waits for it may begin
+      if (::write(ready, "1", 1) < 0) fmt::print(stderr, "ves view: nobody waits\n");
+      close(std::exchange(ready, -1));
+    }
     if (live && live->listen()) server.show();
   }
   const WebRefusals& refused = server.refusals();
@@ -107,12 +170,28 @@ int viewCommand(int argc, char** argv) {
   auto* svg =
       cli.add_option("--svg", options.svg, "write a drawing that moves, for a page or a README")
           ->excludes(html);
-  cli.add_option("--from", options.moving.from, "[s] of the log, for --svg")
+  auto* video = cli.add_option("--video", options.video,
+                               "write a film of the page: .mp4, .webm, .gif (Chromium, ffmpeg)")
+                    ->excludes(html)
+                    ->excludes(svg);
+  auto* png = cli.add_option("--png", options.png, "write a picture of the page for print, 300 dpi")
+                  ->excludes(html)
+                  ->excludes(svg)
+                  ->excludes(video);
+  cli.add_option("--at", options.at, "[s] of the log, for --png")
       ->check(inRange(0.0, 1e9))
-      ->needs(svg);
-  cli.add_option("--to", options.moving.to, "[s]")->check(inRange(0.0, 1e9))->needs(svg);
+      ->needs(png);
+  cli.add_option("--from", options.moving.from, "[s] of the log, for --svg and --video")
+      ->check(inRange(0.0, 1e9));
+  cli.add_option("--to", options.moving.to, "[s]")->check(inRange(0.0, 1e9));
+  cli.add_option("--speed", options.film.speed, "[-] of real time, for --video")
+      ->check(inRange(0.01, 100.0))
+      ->needs(video);
+  cli.add_option("--look", options.film.look, "from where, for --video and --png")
+      ->check(CLI::IsMember({"iso", "front", "side", "top", "arm"}));
   cli.add_option("--rate", options.rate,
-                 "[1/s] pictures of a log; 60 in a file, 8 in a drawing, every tick in a browser")
+                 "[1/s] pictures: 60 in a page, 25 in a film, 8 in a drawing, every tick in a "
+                 "browser")
       ->check(inRange(0.1, 1000.0));
   addScenarioOfLog(cli, options.scenario);
   addUrl(cli, options.url);
@@ -122,12 +201,19 @@ int viewCommand(int argc, char** argv) {
   cli.add_option("--bind", options.address, "address of this machine that browsers connect to")
       ->capture_default_str();
   cli.add_option("--listener", options.listener)->group("");  // for ves run --view
+  cli.add_option("--ready", options.ready)->group("");
   return run(cli, argc, argv, [&] {
-    if (html->count() + svg->count() == 0) return servePage(options);
-    if (options.logs.empty() || (svg->count() > 0 && options.logs.size() > 1))
-      throw InputError(svg->count() > 0 ? "--svg: want one log" : "--html: want a log");
-    if (svg->count() > 0) return writeMoving(options);
-    return writePage(options);
+    const CLI::Option* files[] = {html, svg, video, png};
+    const auto* file = std::find_if(std::begin(files), std::end(files),
+                                    [](const CLI::Option* o) { return o->count() > 0; });
+    if (file == std::end(files)) return servePage(options);
+    if (options.logs.empty() || (*file == svg && options.logs.size() > 1))
+      throw InputError(
+          fmt::format("{}: want {} log", (*file)->get_name(), *file == svg ? "one" : "a"));
+    if (*file == svg) return writeMoving(options);
+    return *file == video ? writeFilm(options)
+           : *file == png ? writePrint(options)
+                          : writePage(options);
   });
 }
 

@@ -327,6 +327,7 @@ void ControllerLink::receiveSample(const void* data, std::uint32_t size) noexcep
   }
   if (!same) clock_ = ClockOffset();
   machine_.take(message->header);
+  ++samples_;
   sample_ = *sample;
   answers_ = message->answers;
   sample_time_ = message->header.time_ns;

@@ -237,6 +237,7 @@ bool wellFormed(const std::string& channel, const void* data, std::int64_t size)
   if (channel == channel::kTiming) return decode<timing_t>(data, size).has_value();
   if (channel == channel::kRobot) return decode<robot_command_t>(data, size).has_value();
   if (channel == channel::kSetup) return decode<setup_t>(data, size).has_value();
+  if (channel == channel::kPace) return decode<pace_t>(data, size).has_value();
   if (channel == channel::kQuery) return decode<query_t>(data, size).has_value();
   if (channel == channel::kOperator) return decode<operator_t>(data, size).has_value();
   return false;

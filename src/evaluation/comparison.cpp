@@ -138,26 +138,27 @@ std::string whyNotCompared(const Series& series) {
   return "";
 }
 
+bool ToldPushes::add(const Row& row) {
+  if (!inAdmittance(row.state) || !row.has_truth) return false;
+  const truth_t& m = row.truth;
+  if (!start_) start_ = row.state.machine_time_ns;
+  if (m.pushes <= seen_) return false;
+  seen_ = m.pushes;
+  // One may last from before.
+  const std::int64_t begun = m.push_began_ns - *start_;
+  const double before = static_cast<double>(std::max<std::int64_t>(0, -begun));
+  const double rest = m.push_duration - before * kSecondPerNanosecond;
+  if (!(rest > 0.0)) return false;
+  list_.push_back({std::max<std::int64_t>(0, begun),
+                   Push{static_cast<Push::On>(m.push_on), m.push_link, Vec3::Map(m.push_point),
+                        Vec3::Map(m.push_force), rest}});
+  return true;
+}
+
 std::vector<TimedAction> pushesOf(const Series& series) {
-  std::vector<TimedAction> out;
-  std::optional<std::int64_t> start;  // [ns] by the machine's clock
-  int seen = 0;
-  for (const Row& row : series.rows) {
-    if (!inAdmittance(row.state) || !row.has_truth) continue;
-    const truth_t& m = row.truth;
-    if (!start) start = row.state.machine_time_ns;
-    if (m.pushes <= seen) continue;
-    seen = m.pushes;
-    // One may last from before.
-    const std::int64_t begun = m.push_began_ns - *start;
-    const double before = static_cast<double>(std::max<std::int64_t>(0, -begun));
-    const double rest = m.push_duration - before * kSecondPerNanosecond;
-    if (rest > 0.0)
-      out.push_back({std::max<std::int64_t>(0, begun),
-                     Push{static_cast<Push::On>(m.push_on), m.push_link, Vec3::Map(m.push_point),
-                          Vec3::Map(m.push_force), rest}});
-  }
-  return out;
+  ToldPushes told;
+  for (const Row& row : series.rows) told.add(row);
+  return told.list();
 }
 
 std::optional<Emulation> emulation(const Series& series, ReferenceMotions& references) {

@@ -12,28 +12,44 @@
 namespace ves {
 namespace {
 
-constexpr std::int64_t kSecond = 1'000'000'000;    // [ns]
-constexpr std::int64_t kStopRepeat = kSecond / 5;  // [ns] without an answer
-constexpr int kStopTimes = 10;                     // [-]
+constexpr std::int64_t kSecond = 1'000'000'000;      // [ns]
+constexpr std::int64_t kRepeat = kSecond / 5;        // [ns] without an answer
+constexpr int kStopTimes = 10, kVehicleTimes = 100;  // [-] the stability check takes its time
+
+/// Pushes that were told, and those of the program that are still to come.
+std::vector<TimedAction> allPushes(const Experiment& e, const std::vector<TimedAction>& told) {
+  std::vector<TimedAction> out = told;
+  std::int64_t duration = 0;
+  for (const TimedAction& action : interactionOf(e, duration).actions)
+    if (std::holds_alternative<Push>(action.action) &&
+        (told.empty() || action.start > told.back().start + 2 * e.controller.period))
+      out.push_back(action);
+  return out;
+}
 
 }  // namespace
 
 LiveRun::LiveRun(const std::string& url) : bus_(url) {
-  bus_.subscribe(
-      {channel::kSample, channel::kState, channel::kTruth, channel::kTiming, channel::kExperiment},
-      [this](const std::string& channel, const void* data, std::uint32_t size) {
-        if (channel == channel::kState) {
-          if (const auto m = decode<state_t>(data, size)) takeState(*m);
-        } else if (channel == channel::kExperiment) {
-          if (const auto m = decode<experiment_t>(data, size)) takeExperiment(*m);
-        } else if (channel == channel::kTruth) {
-          if (const auto m = decode<truth_t>(data, size)) rows_.add(*m);
-        } else if (channel == channel::kSample) {
-          if (const auto m = decode<sample_t>(data, size)) rows_.add(*m);
-        } else if (const auto m = decode<timing_t>(data, size)) {
-          if (m->header.source == controller_.source) rows_.add(*m);
-        }
-      });
+  bus_.subscribe({channel::kSample, channel::kState, channel::kTruth, channel::kTiming,
+                  channel::kExperiment, channel::kSetup},
+                 [this](const std::string& channel, const void* data, std::uint32_t size) {
+                   if (channel == channel::kState) {
+                     if (const auto m = decode<state_t>(data, size)) takeState(*m);
+                   } else if (channel == channel::kExperiment) {
+                     if (const auto m = decode<experiment_t>(data, size)) takeExperiment(*m);
+                   } else if (channel == channel::kSetup) {
+                     if (const auto m = decode<setup_t>(data, size)) setup_ = *m;
+                   } else if (channel == channel::kTruth) {
+                     if (const auto m = decode<truth_t>(data, size)) rows_.add(*m);
+                   } else if (channel == channel::kSample) {
+                     if (const auto m = decode<sample_t>(data, size)) {
+                       rows_.add(*m);
+                       machine_ = m->header.source;
+                     }
+                   } else if (const auto m = decode<timing_t>(data, size)) {
+                     if (m->header.source == controller_.source) rows_.add(*m);
+                   }
+                 });
 }
 
 bool LiveRun::listen() {
@@ -58,11 +74,13 @@ bool LiveRun::follow(const state_t& state) {
   pictures_.clear();
   experiment_.reset();
   scene_.reset();
+  curves_.reset();
   base_.reset();
   let_go_.reset();
   stop_.reset();
+  vehicle_.reset();
   instants_.clear();
-  rate_ = NAN;
+  rate_ = pace_ = NAN;
   asked_ = 0;
   return true;
 }
@@ -74,11 +92,12 @@ void LiveRun::takeState(const state_t& state) {
   heard_ = monotonicNow();
   describe();
   measureRate(state);
-  if (stop_ && state.order_source == self_.source && state.order_sequence == stop_->sequence)
-    stop_->taken = true;
+  hearAnswer(stop_, state);
+  hearAnswer(vehicle_, state);
   const auto row = rows_.add(state);
   if (!row || !scene_) return;
   row_ = *row;
+  if (let_go_ && let_go_->pushes.add(*row)) let_go_->computed = false;
   // Who joins late has the same time.
   row_->t = static_cast<double>(row_->state.header.sequence * experiment_->controller.period) *
             kSecondPerNanosecond;
@@ -97,6 +116,7 @@ void LiveRun::describe() {
   try {
     experiment_ = parseExperiment(described_->resolved, channel::kExperiment);
     scene_.emplace(*experiment_);
+    curves_.emplace(*experiment_);
   } catch (const InputError& error) {
     if (!std::exchange(warned_, true)) fmt::print(stderr, "ves view: {}\n", error.what());
     experiment_.reset();
@@ -108,10 +128,18 @@ void LiveRun::describe() {
   ++edition_;
   nlohmann::ordered_json text;
   text["edition"] = edition_;
-  text["width"] = scene_->width() + 2;
   text["scene"] = scene_->description();
-  text["scene"]["scalars"].push_back("real_time_factor");
-  text["scene"]["scalars"].push_back("stop_requested");
+  auto& scalars = text["scene"]["scalars"];
+  for (const char* name :
+       {"stop_asked", "stop_refusal", "vehicle_asked", "vehicle_refusal", "pace", "lockstep"})
+    scalars.push_back(name);
+  auto refusals = nlohmann::ordered_json::array();
+  for (int i = 0; i < static_cast<int>(Refusal::kCount); ++i)
+    refusals.push_back(name(static_cast<Refusal>(i)));
+  text["scene"]["refusals"] = refusals;
+  text["columns"] = curves_->description();
+  text["columns"].push_back({{"name", "real_time_factor"}, {"meaning", "of the last second"}});
+  text["width"] = scene_->width() + 6 + curves_->size() + 1;
   scene_text_ = text.dump();
 }
 
@@ -123,10 +151,12 @@ void LiveRun::followBase(const state_t& state) {
     let_go_ = LetGo{state.header.sequence, Vec6::Map(state.x_desired), false};
   if (let_go_ && !let_go_->computed && experiment_ && !computing_.valid()) {
     let_go_->computed = true;
-    computing_ = std::async(std::launch::async, [e = *experiment_, x = let_go_->x] {
-      ReferenceMotions references;
-      return baseMotion(e, x, references);
-    });
+    computing_ = std::async(std::launch::async,
+                            [e = *experiment_, x = let_go_->x, told = let_go_->pushes.list()] {
+                              ReferenceMotions references;
+                              const std::vector<TimedAction> pushes = allPushes(e, told);
+                              return baseMotion(e, x, references, &pushes);
+                            });
   }
   if (computing_.valid() &&
       computing_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) {
@@ -156,19 +186,56 @@ void LiveRun::remind() {
     query.header = header(self_, sent_++, now);
     bus_.publish(channel::kQuery, query);
   }
-  if (stop_ && !stop_->taken && stop_->times > 0 && now - stop_->sent > kStopRepeat) {
-    stop_->sent = now;
-    --stop_->times;
-    bus_.publish(channel::kOperator, toMessage(Order{Request::kStop, {}, {}, controller_.source},
-                                               header(self_, stop_->sequence, now)));
-  }
+  repeat(stop_);
+  repeat(vehicle_);
 }
 
-void LiveRun::requestStop(std::int64_t edition) {
-  if (edition != edition_ || !scene_) return;
-  if (stop_ && !stop_->taken && stop_->times > 0) return;  // under way
-  stop_ = Stop{sent_++, 0, kStopTimes};
-  remind();
+void LiveRun::ask(std::optional<Asked>& asked, const Order& order, int times) {
+  asked = Asked{order, sent_++, 0, times};
+  repeat(asked);
+}
+
+void LiveRun::repeat(std::optional<Asked>& asked) {
+  const std::int64_t now = monotonicNow();
+  if (!asked || !asked->underWay() || now - asked->sent <= kRepeat) return;
+  asked->sent = now;
+  --asked->times;
+  Order order = asked->order;
+  order.controller = controller_.source;
+  bus_.publish(channel::kOperator, toMessage(order, header(self_, asked->sequence, now)));
+}
+
+void LiveRun::hearAnswer(std::optional<Asked>& asked, const state_t& state) const {
+  const auto refusal = static_cast<Refusal>(state.refusal);
+  if (asked && state.order_source == self_.source && state.order_sequence == asked->sequence &&
+      refusal != Refusal::kChecking)
+    asked->answer = refusal;
+}
+
+void LiveRun::take(const PageMessage& message) {
+  if (message.edition != edition_ || !scene_) return;
+  const auto* push = std::get_if<PushOrder>(&message.what);
+  const auto* vehicle = std::get_if<VehicleOrder>(&message.what);
+  const auto* pace = std::get_if<PageMessage::Pace>(&message.what);
+  if (push || pace || vehicle) {  // of a machine with real pieces only a stop
+    if (!experiment_->machine.simulated()) return;
+    if (push && !whyNotPushed(*experiment_, *push).empty()) return;
+  }
+  const std::int64_t now = monotonicNow();
+  if (push) {
+    robot_command_t order = toMessage(*push, header(self_, sent_++, now));
+    order.machine = machine_;
+    bus_.publish(channel::kRobot, order);
+  } else if (vehicle) {
+    Order order{Request::kVehicle, {}, {}};
+    order.vehicle = *vehicle;
+    ask(vehicle_, order, kVehicleTimes);  // the newest counts
+  } else if (pace) {
+    pace_ = pace->rate;
+    bus_.publish(channel::kPace, pace_t{header(self_, sent_++, now), machine_, pace->rate});
+  } else if (!stop_ || !stop_->underWay()) {
+    ask(stop_, Order{Request::kStop, {}, {}}, kStopTimes);
+  }
 }
 
 void LiveRun::keepPicture() {
@@ -176,8 +243,21 @@ void LiveRun::keepPicture() {
   std::optional<Vec6> base;
   if (base_) base = base_->point(row_->state.header.sequence - let_go_->tick);
   Picture one{newest_, row_->state.header.time_ns, rate_, scene_->picture(*row_, base)};
+  // 0: nothing asked, 1: not answered yet, 2: answered, and how
+  const auto tell = [&](const std::optional<Asked>& asked) {
+    one.numbers.push_back(!asked ? 0.0f : asked->answer ? 2.0f : 1.0f);
+    one.numbers.push_back(
+        asked && asked->answer ? static_cast<float>(static_cast<int>(*asked->answer)) : NAN);
+  };
+  tell(stop_);
+  tell(vehicle_);
+  one.numbers.push_back(static_cast<float>(pace_));
+  const bool lockstep =
+      setup_ && setup_->header.source == controller_.source && setup_->lockstep != 0;
+  one.numbers.push_back(lockstep ? 1.0f : 0.0f);
+  const std::vector<float> curves = curves_->of(*row_, base);
+  one.numbers.insert(one.numbers.end(), curves.begin(), curves.end());
   one.numbers.push_back(static_cast<float>(rate_));
-  one.numbers.push_back(!stop_ ? 0.0f : stop_->taken ? 2.0f : 1.0f);
   pictures_.push_back(std::move(one));
   if (pictures_.size() > kKept) pictures_.pop_front();
 }

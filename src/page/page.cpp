@@ -3,8 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdint>
-#include <cstring>
 #include <fstream>
 #include <sstream>
 
@@ -34,31 +34,40 @@ std::string script(std::string text) {
 }
 
 std::string pageOf(const std::string& title, const std::string& recordings) {
+  std::string own;
+  for (const char* part : kPageScripts) own += part;
   return "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
          "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>" +
          title + "</title>\n<style>\n" + library("dygraphs/dygraph.min.css") + kPageStyle +
          "</style>\n</head>\n" + kPageBody + script(library("three/three.min.js")) +
          script(library("three/examples/js/controls/OrbitControls.js")) +
          script(library("dygraphs/dygraph.min.js")) +
-         script("window.VES_RECORDINGS = " + recordings + ";") + script(kPageScript) + "</html>\n";
+         script("window.VES_RECORDINGS = " + recordings + ";") +
+         script("(function () {\n'use strict';\n" + own + "})();") + "</html>\n";
 }
 
-}  // namespace
-
-std::string base64(const std::vector<float>& numbers) {
+std::string base64Of(const void* data, std::size_t size) {
   constexpr const char* kLetters =
       "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::vector<std::uint8_t> bytes(numbers.size() * sizeof(float));
-  if (!numbers.empty()) std::memcpy(bytes.data(), numbers.data(), bytes.size());
+  const auto* bytes = static_cast<const std::uint8_t*>(data);
   std::string out;
-  out.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    const std::size_t n = std::min<std::size_t>(3, bytes.size() - i);
+  out.reserve((size + 2) / 3 * 4);
+  for (std::size_t i = 0; i < size; i += 3) {
+    const std::size_t n = std::min<std::size_t>(3, size - i);
     std::uint32_t word = 0;
     for (std::size_t k = 0; k < 3; ++k) word = word << 8 | (k < n ? bytes[i + k] : 0u);
     for (std::size_t k = 0; k < 4; ++k) out += k <= n ? kLetters[word >> (18 - 6 * k) & 63u] : '=';
   }
   return out;
+}
+
+}  // namespace
+
+std::string base64(const std::vector<float>& numbers) {
+  return base64Of(numbers.data(), numbers.size() * sizeof(float));
+}
+std::string base64OfCounts(const std::vector<std::uint16_t>& numbers) {
+  return base64Of(numbers.data(), numbers.size() * sizeof(std::uint16_t));
 }
 
 std::string page(const std::vector<nlohmann::ordered_json>& recordings) {

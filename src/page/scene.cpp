@@ -12,6 +12,7 @@
 #include "ves/core/coordinates.hpp"
 #include "ves/core/errors.hpp"
 #include "ves/math/dense.hpp"
+#include "ves/page/curves.hpp"
 #include "ves/page/page.hpp"
 
 namespace ves {
@@ -36,12 +37,6 @@ int number(const Vec3& colour) {
 
 /// Of the report's platform, to which the sizes above belong.
 constexpr double kJointRadius = 0.55;  // [m]
-
-/// Axes whose z points along a leg; how they are turned about it does not matter.
-Mat3 along(const Vec3& way) {
-  const Vec3 z = way.normalized(), x = z.unitOrthogonal();
-  return (Mat3() << x, z.cross(x), z).finished();
-}
 
 Json capsule(const std::string& frame, const Vec3& from, const Vec3& to, double radius) {
   return {{"kind", "capsule"},
@@ -100,17 +95,17 @@ Scene::Scene(const Experiment& e)
   addPlate(shapes, "", geometry_.p_IBi_I, size_);
   addPlate(shapes, "platform", geometry_.p_PPi_P, size_);
   const double length = e.plant.actuator.length_min;
+  description_["legs"] = Json::array();
   for (int i = 0; i < kLegs; ++i) {
-    const std::string leg = fmt::format("leg{}", i + 1), rod = fmt::format("rod{}", i + 1);
-    addFrame(leg, "");
-    addFrame(rod, "");
+    const auto at = static_cast<std::size_t>(i);
+    description_["legs"].push_back({json(geometry_.p_IBi_I[at]), json(geometry_.p_PPi_P[at])});
     shapes.push_back({{"kind", "cylinder"},
-                      {"frame", leg},
+                      {"frame", fmt::format("leg{}", i + 1)},
                       {"length", 0.85 * length},
                       {"radius", 2.0 * kRodRadius * size_},
                       {"leg", i}});
     shapes.push_back({{"kind", "cylinder"},
-                      {"frame", rod},
+                      {"frame", fmt::format("rod{}", i + 1)},
                       {"length", -length},
                       {"radius", kRodRadius * size_},
                       {"leg", i}});
@@ -123,49 +118,53 @@ Scene::Scene(const Experiment& e)
   if (e.plant.task.world) addWorld(e.plant.task.world->environment);
   addArm();
 
-  const auto addPose = [&](const char* what, const double(state_t::*field)[6]) {
-    for (int i = 0; i < 6; ++i)
-      scalars_.push_back({fmt::format("{}_{}", coordinate(i).name, what),
-                          [field, i](const Row& r) { return (r.state.*field)[i]; }});
+  const auto add = [&](std::string name, auto value) {
+    scalars_.push_back({std::move(name), value});
   };
-  const auto add = [&](const char* name, auto value) { scalars_.push_back({name, value}); };
   add("t_s", [](const Row& r) { return r.t; });
   add("phase", [](const Row& r) { return static_cast<double>(r.state.phase); });
   add("segment", [](const Row& r) { return static_cast<double>(r.state.segment); });
   add("kind", [](const Row& r) { return static_cast<double>(r.state.kind); });
   add("cause", [](const Row& r) { return static_cast<double>(r.state.cause); });
-  addPose("commanded", &state_t::x_desired);
-  addPose("measured", &state_t::x_measured);
-  for (int i = 0; i < 6; ++i)
-    scalars_.push_back({fmt::format("{}_actual", coordinate(i).name),
-                        [i](const Row& r) { return r.hasTruePose() ? r.truth.x[i] : NAN; }});
-  // Before the calibration that is to come it is the sensor's bias, as large as the robot's weight.
   const Program& program = e.controller.program;
   const bool waits =
       std::any_of(program.segments.begin(), program.segments.begin() + program.size,
                   [](const Segment& s) { return s.kind == SegmentKind::kCalibration; });
-  for (int i = 0; i < 6; ++i)
-    scalars_.push_back(
-        {fmt::format("{}_dynamic", wrenchComponent(i).name), [i, waits](const Row& r) {
-           const bool known = r.state.kind != static_cast<int>(SegmentKind::kCalibration) &&
-                              (r.state.calibration == static_cast<int>(CalibrationStatus::kDone) ||
-                               !Vec6::Map(r.state.bias).isZero(0.0));
-           return known || !waits ? r.state.dynamic[i] : NAN;
-         }});
-  for (int i = 0; i < kLegs; ++i)
-    scalars_.push_back({fmt::format("leg{}_error_m", i + 1),
-                        [i](const Row& r) { return r.state.leg[i] - r.state.leg_measured[i]; }});
+  for (int i = 0; i < 3; ++i)
+    add(fmt::format("{}_dynamic", wrenchComponent(i).name), [i, waits](const Row& r) {
+      return calibrated(r.state) || !waits ? r.state.dynamic[i] : NAN;
+    });
   const SafetyLimits limits = e.controller.safety;
   for (int i = 0; i < kLegs; ++i)  // 1 in the middle of the stroke, 0 at a limit
-    scalars_.push_back({fmt::format("leg{}_margin", i + 1), [i, limits](const Row& r) {
-                          const double half = 0.5 * (limits.leg_max - limits.leg_min);
-                          return std::min(r.state.leg_measured[i] - limits.leg_min,
-                                          limits.leg_max - r.state.leg_measured[i]) /
-                                 half;
-                        }});
-  add("late_s", [](const Row& r) {
-    return r.has_timing ? static_cast<double>(r.timing.late_ns) * kSecondPerNanosecond : NAN;
-  });
+    add(fmt::format("leg{}_margin", i + 1), [i, limits](const Row& r) {
+      const double half = 0.5 * (limits.leg_max - limits.leg_min);
+      return std::min(r.state.leg_measured[i] - limits.leg_min,
+                      limits.leg_max - r.state.leg_measured[i]) /
+             half;
+    });
+  if (e.plant.task.world)
+    for (int i = 0; i < 6; ++i)
+      add(fmt::format("{}_contact", wrenchComponent(i).name),
+          [i](const Row& r) { return r.has_truth ? r.truth.contact[i] : NAN; });
+  // A push while it lasts, NaN else; where it is in the frame of what is pushed.
+  const auto addPush = [&](std::string name, auto value) {
+    add(std::move(name), [value](const Row& r) {
+      return r.has_truth && pushed(r.truth) ? static_cast<double>(value(r.truth)) : NAN;
+    });
+  };
+  addPush("push_on", [](const truth_t& m) { return m.push_on; });
+  addPush("push_link", [](const truth_t& m) { return m.push_link; });
+  for (int i = 0; i < 3; ++i) {
+    addPush(fmt::format("push_{}", coordinate(i).name),
+            [i](const truth_t& m) { return m.push_point[i]; });
+    addPush(fmt::format("push_f{}", coordinate(i).name),
+            [i](const truth_t& m) { return m.push_force[i]; });
+  }
+  description_["emulates"] =
+      std::any_of(program.segments.begin(), program.segments.begin() + program.size,
+                  [](const Segment& s) { return s.kind == SegmentKind::kAdmittance; });
+  description_["simulated"] = e.machine.simulated();
+  description_["target"] = target_.has_value();
 
   Json names = Json::array(), phases = Json::array(), segments = Json::array(),
        kinds = Json::array(), checks = Json::array();
@@ -361,19 +360,13 @@ std::vector<float> Scene::picture(const Row& row, const std::optional<Vec6>& bas
       row.hasTruePose() ? Vec6(Vec6::Map(row.truth.x)) : Vec6(Vec6::Map(row.state.x_measured));
   const JointVector q = row.has_truth    ? JointVector(JointVector::Map(row.truth.q))
                         : row.has_sample ? JointVector(JointVector::Map(row.sample.q))
-                                         : JointVector(JointVector::Zero());
+                                         : JointVector(JointVector::Constant(NAN));
   const Transform X_IP = geometry_.fromHome(Pose::from(x));
   put(X_IP);
   if (base)
     put(geometry_.fromHome(Pose::from(*base)));
   else
     out.insert(out.end(), 7, NAN);
-  for (std::size_t i = 0; i < kLegs; ++i) {
-    const Vec3 from = geometry_.p_IBi_I[i], to = X_IP * geometry_.p_PPi_P[i];
-    const Mat3 R = along(to - from);
-    put({R, from});
-    put({R, to});
-  }
   const LinkPoses X_L0L = linkPoses(payload_.robot, q);
   const Transform X_PL0 = payload_.X_PL0();
   for (int i = 0; i < payload_.robot.size; ++i) put(X_PL0 * X_L0L[i]);
@@ -416,6 +409,7 @@ nlohmann::ordered_json recording(const Series& series, double rate,
   }
   Json out = {{"scene", scene.description()}, {"width", scene.width()}};
   out["pictures"] = base64(numbers);
+  out["columns"] = recordedCurves(series, base);
   return out;
 }
 

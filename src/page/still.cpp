@@ -119,6 +119,14 @@ Drawing drawn(const Scene& scene, const std::vector<float>& picture, StillView v
     frames[frame["name"].get<std::string>()] = frames[frame["parent"].get<std::string>()] * X;
     at += 7;
   }
+  for (std::size_t i = 0; i < d["legs"].size(); ++i) {
+    const Vec3 from = point(d["legs"][i][0]), to = frames["platform"] * point(d["legs"][i][1]);
+    // How they are turned about the leg does not matter.
+    const Vec3 z = (to - from).normalized(), x = z.unitOrthogonal();
+    const Mat3 R = (Mat3() << x, z.cross(x), z).finished();
+    frames[fmt::format("leg{}", i + 1)] = {R, from};
+    frames[fmt::format("rod{}", i + 1)] = {R, to};
+  }
   Drawing drawing;
   for (const Json& shape : d["shapes"]) {
     const Transform& X = frames[shape["frame"].get<std::string>()];

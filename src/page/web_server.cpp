@@ -40,13 +40,62 @@ std::string header(lws* wsi, lws_token_indexes which) {
 }  // namespace
 
 std::optional<PageMessage> parsePageMessage(std::string_view text) {
-  if (text == "drawn") return PageMessage{PageMessage::Kind::kDrawn};
-  constexpr std::string_view kStop = "stop ";
-  if (text.substr(0, kStop.size()) != kStop) return {};
-  text.remove_prefix(kStop.size());
-  PageMessage out{PageMessage::Kind::kStop};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), out.edition);
-  if (error != std::errc() || end != text.data() + text.size() || out.edition < 1) return {};
+  if (text == "drawn") return PageMessage{};
+  const auto word = [&]() -> std::string_view {
+    const std::size_t end = std::min(text.find(' '), text.size());
+    const std::string_view out = text.substr(0, end);
+    text.remove_prefix(std::min(end + 1, text.size()));
+    return out;
+  };
+  const auto as = [](std::string_view from, auto& number) {
+    const auto [end, error] = std::from_chars(from.data(), from.data() + from.size(), number);
+    return error == std::errc() && end == from.data() + from.size();
+  };
+  if (text.empty() || text.back() == ' ') return {};
+  const std::string_view kind = word();
+  PageMessage out;
+  if (!as(word(), out.edition) || out.edition < 1) return {};
+  bool good = true;
+  const auto number = [&] {
+    double x = NAN;
+    good = as(word(), x) && std::isfinite(x) && good;
+    return x;
+  };
+  const auto vector = [&] {
+    Vec3 v;
+    for (double& x : v) x = number();
+    return v;
+  };
+  if (kind == "stop") {
+    out.what = PageMessage::Stop{};
+  } else if (kind == "push") {
+    PushOrder push;
+    const auto on = std::find(std::begin(kPushedNames), std::end(kPushedNames), word());
+    if (on == std::end(kPushedNames)) return {};
+    push.on = static_cast<PushOrder::On>(on - std::begin(kPushedNames));
+    push.force_I = vector();
+    push.duration = number();
+    push.point = vector();
+    good = good && plausible(RobotOrder(push));
+    out.what = push;
+  } else if (kind == "vehicle") {
+    Order order;
+    order.request = Request::kVehicle;
+    order.id.sequence = 0;
+    order.vehicle.to.mass = number();
+    order.vehicle.to.damping = number();
+    order.vehicle.to.stiffness = number();
+    order.vehicle.over = number();
+    good = good && plausible(order);
+    out.what = order.vehicle;
+  } else if (kind == "pace") {
+    const double rate = number();
+    good = good && rate >= 0.0 && rate <= kMostPace;
+    out.what = PageMessage::Pace{rate};
+  } else {
+    return {};
+  }
+  if (!good || !text.empty()) return {};
   return out;
 }
 
@@ -330,8 +379,8 @@ class WebServer::Impl {
       lws_close_reason(wsi, LWS_CLOSE_STATUS_POLICY_VIOLATION, nullptr, 0);
       return -1;
     }
-    if (message->kind == PageMessage::Kind::kStop) {
-      live_->requestStop(message->edition);
+    if (!std::holds_alternative<PageMessage::Drawn>(message->what)) {
+      live_->take(*message);
       return 0;
     }
     page.drawn = true;

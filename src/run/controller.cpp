@@ -99,7 +99,8 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
 
   if (options.lockstep) {
     // The machine advances one period for each command and answers with one sample. A lost message
-    // is repeated; the answer to a repeated one is the same sample again.
+    // is repeated; the answer to a repeated one is the same sample again. A machine that is held
+    // back repeats the sample before.
     LegCommand none;
     leg_command_t out = toMessage(none, header(self, -1, 0));
     std::int64_t first = 0;  // [ns] the machine's clock at tick 0
@@ -108,8 +109,10 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
         if (i == kAnswerTries)
           throw InputError(fmt::format("bus {}: no machine in lockstep answers", options.url));
         link.send(out);
-        const std::int64_t until = monotonicNow() + kAnswerTime * 1'000'000LL;
+        const std::int64_t until = monotonicNow() + kAnswerTime * 1'000'000LL,
+                           heard = link.samples();
         while (link.answers() != in.tick - 1 && monotonicNow() < until) bus.waitAwake(kAnswerTime);
+        if (link.samples() > heard) i = 0;
         if (wantsOut()) return letGo();
       }
       in.sample = link.sample();

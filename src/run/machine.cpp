@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
+#include "pace.hpp"
 #include "process_conduct.hpp"
 #include "ves/bus/channels.hpp"
 #include "ves/devices/machine.hpp"
@@ -84,6 +85,7 @@ sample_t MachineProcess::publish(std::int64_t answers) {
 /// One period for each command, and one sample in answer; a repeated command gets the same one.
 void MachineProcess::inLockstep(const std::function<bool()>& stop) {
   const std::int64_t period = experiment_.controller.period;
+  Pace pace(bus_, self_.source, options_.pace);
   std::int64_t answered = -2;  // tick
   std::int64_t start = 0;      // [ns] plant time of the controller's tick 0
   sample_t last;
@@ -105,6 +107,12 @@ void MachineProcess::inLockstep(const std::function<bool()>& stop) {
       if (tick >= 0) {
         machine_.command(legs);
         until = start + (tick + 1) * period;
+      }
+      for (int wait; (wait = pace.wait(until, monotonicNow())) > 0 && !stop();) {
+        bus_.wait(wait);
+        moveRobot(true);
+        if (link_.takeCommand() && answered > -2)  // it is asked again
+          bus_.publish(channel::kSample, last);
       }
       machine_.advance(until, until);
       last = publish(tick);

@@ -39,6 +39,7 @@ Session::Session(const Experiment& experiment, const LaunchOptions& options)
   if (!process.log.empty())
     arguments.insert(arguments.end(),
                      {"--flight", std::filesystem::path(process.log).parent_path().string()});
+  if (process.pace) shared.insert(shared.end(), {"--pace", fmt::format("{}", *process.pace)});
   if (options.plant) plant_ = std::make_unique<Process>(options.program, shared);
   controller_ = std::make_unique<Process>(options.program, arguments);
 }

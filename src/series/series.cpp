@@ -236,6 +236,12 @@ double coordinateOf(const Transform& X_IT, int i) {
   return i < 3 ? X_IT.p(i) : fixedAngles(X_IT.R)(i - 3);
 }
 
+bool pushed(const truth_t& truth) noexcept {
+  const double since =
+      static_cast<double>(truth.header.time_ns - truth.push_began_ns) * kSecondPerNanosecond;
+  return truth.pushes > 0 && since < truth.push_duration;
+}
+
 std::vector<Column> columns(const Experiment& experiment) {
   std::vector<Column> out;
   const auto add = [&](std::string name, auto value, std::string meaning) {
@@ -291,11 +297,7 @@ std::vector<Column> columns(const Experiment& experiment) {
   for (int i = 0; i < 3; ++i)
     truth(
         fmt::format("push_{}_n", wrenchComponent(i).name),
-        [i](const truth_t& m) {
-          const double since =
-              static_cast<double>(m.header.time_ns - m.push_began_ns) * kSecondPerNanosecond;
-          return m.pushes > 0 && since < m.push_duration ? m.push_force[i] : 0.0;
-        },
+        [i](const truth_t& m) { return pushed(m) ? m.push_force[i] : 0.0; },
         "of the push that lasts, in inertial axes");
   if (experiment.plant.task.world) {
     truth(

@@ -104,7 +104,7 @@ class Clients(unittest.TestCase):
                 "no word": [(b"hello", 1)], "a number too large": [(b"stop 99999999999999999999", 1)],
                 "binary": [(b"drawn", 2)], "long": [(b"drawn" * 1000, 1)], "empty": [(b"", 1)],
                 "another opcode": [(b"drawn", 5)], "no text": [(b"\xff\xfe", 1)],
-                "a flood": [(b"drawn", 1)] * 1000, "pieces without an end": [(b"drawn", 1, False)] + [(b"drawn", 0, False)] * 50}.items():
+                "a flood": [(b"drawn", 1)] * 1000, "pieces without an end": [(b"drawn", 1, False)] + [(b"drawn", 0, False)] * 60}.items():
             with self.subTest(what):
                 page = self.socket(run.url)
                 self.assertEqual(page.status, 101)

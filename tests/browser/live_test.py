@@ -7,16 +7,31 @@
 Each run is on a bus of its own (--private-bus). What the page drew while it ran is compared with
 series.csv afterwards.
 """
+import subprocess
+import time
+
 import numpy as np
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.ui import Select
 
 import support
 
 PERIOD = 0.01  # [s]
 STOP = 2       # operator_t.request
+FREE = [word for key in ("controller.compensation.feed_forward=true", "controller.compensation.observer=true",
+                         "controller.compensation.inertia=true", "sensor.noise=false",
+                         "program=[{move: {}}, {calibration: {}}, {admittance: {duration_s: 9}}]")
+        for word in ("--set", key)]
+
+SWINGING = FREE[:-1] + ["program=[{move: {}}, {calibration: {}}, {admittance: {duration_s: 20}, robot: ["
+                        + ", ".join(f"{{at_s: {1 + 2 * k}, duration_s: 1.5, joint: joint_2, to_deg_or_m: {-60 if k % 2 == 0 else -90}}}"
+                                    for k in range(9)) + "]}]"]
 
 
 class Live(support.Page):
     def open(self, run):
+        support.errors(self.browser)  # those of the run before are told
         self.browser.get(run.url)
         self.until("window.ves !== undefined && ves.count > 1")
 
@@ -43,6 +58,76 @@ class Live(support.Page):
             for name, matrix in zip(names, matrices):
                 error = np.abs(np.array(matrix).reshape(4, 4).T - due[name]).max()
                 self.assertLess(error, 1e-6, f"{name} at {t} s")
+
+    def drag(self, name, dx, dy):
+        """Shift, the mouse on that frame, so many pixels, and let go."""
+        x, y = self.ask("ves.seen(arguments[0])", name)
+        canvas = self.browser.find_element("id", "canvas")
+        at = canvas.rect
+        mouse = ActionChains(self.browser, duration=50)
+        mouse.move_to_element_with_offset(canvas, int(x - at["x"] - at["width"] / 2), int(y - at["y"] - at["height"] / 2))
+        mouse.key_down(Keys.SHIFT).click_and_hold().move_by_offset(dx // 2, dy // 2).move_by_offset(dx - dx // 2, dy - dy // 2)
+        mouse.perform()
+        self.shot("push")
+        ActionChains(self.browser).release().key_up(Keys.SHIFT).perform()
+
+    def test_a_push_moves_it_as_it_would_the_base(self):
+        run = support.Run(self.out / "push", *FREE)
+        self.open(run)
+        Select(self.browser.find_element("id", "pushed")).select_by_value("platform")
+        self.until("ves.words.includes('admittance') && ves.time() > 3.5")
+        floor = self.ask("ves.seen('')")
+        self.drag("platform", 80, 0)  # 0.25 N a pixel
+        self.assertEqual(self.ask("ves.seen('')"), floor)  # nobody has turned the camera
+        self.until("ves.live.closed")
+        self.assertEqual(run.wait(), 0, run.said)
+        rows = list(support.rows(run.out, "tick").values())
+        force = np.array([[float(r[f"push_f{c}_n"]) for c in "xyz"] for r in rows])
+        pushed = np.linalg.norm(force, axis=1) > 0
+        self.assertAlmostEqual(np.linalg.norm(force[pushed][0]), 20, delta=0.5)
+        self.assertAlmostEqual(pushed.sum() * PERIOD, 0.2, delta=0.011)
+        # The base in free space was pushed alike: the platform moves as it does.
+        summary = run.summary()
+        self.assertGreater(summary["emulation_amplitude_m"], 5e-4)
+        self.assertLess(summary["emulation_error_position_share"], 0.05)
+        replayed = support.ves("replay", run.out, "--check", stdout=subprocess.PIPE)
+        said, _ = replayed.communicate()
+        self.assertEqual(replayed.returncode, 0, said)
+
+    def test_sliders_change_the_vehicle_once_the_gate_lets_them(self):
+        run = support.Run(self.out / "vehicle", *SWINGING)  # one that rests under a load waits
+        self.open(run)
+        self.until("ves.words.includes('admittance')")
+        slide = """const s = document.getElementById(arguments[0]); s.value = arguments[1];
+                   s.dispatchEvent(new Event('input'));"""
+        self.browser.execute_script(slide, "stiffness", 0.3)
+        self.until("ves.words.includes('vehicle: taken')")
+        self.until("ves.words.includes('× 1, 1, 2')")
+        self.browser.execute_script(slide, "mass", -0.3)
+        self.until("ves.words.includes('× 0.5, 1, 2')")
+        self.shot("vehicle")
+        self.assertEqual(run.wait(), 0, run.said)
+
+    def test_time_stands_and_goes_slowly_in_lockstep(self):
+        run = support.Run(self.out / "pace", "--lockstep", *FREE)
+        self.open(run)
+        self.until("ves.time() > 1")
+        self.browser.find_element("css selector", "[data-pace='0']").click()
+        self.until("ves.words.includes('time stands')")
+        before = self.ask("ves.live.head[0]")
+        time.sleep(1)  # that nothing comes has no condition to wait for
+        self.assertLess(self.ask("ves.live.head[0]") - before, 20)
+        for pace, least, most in ((0.1, 0.05, 0.2), (5, 2, 6)):
+            self.browser.find_element("css selector", f"[data-pace='{pace}']").click()
+            began, at = time.monotonic(), self.ask("ves.time()")
+            self.until(f"ves.time() > {at + pace}")
+            self.assertTrue(least < (self.ask("ves.time()") - at) / (time.monotonic() - began) < most, pace)
+        self.until("ves.live.closed")
+        self.assertEqual(run.wait(), 0, run.said)
+        # What it was shown for changes nothing of what happened.
+        alone = self.out / "alone"
+        self.assertEqual(support.ves("run", "puma_on_table_4_1", "--lockstep", "--no-plots", "--quiet", "--out", alone, *FREE).wait(), 0)
+        self.assertEqual((run.out / "series.csv").read_text(), (alone / "series.csv").read_text())
 
     def test_a_stop_takes_the_platform_home(self):
         run = support.Run(self.out / "stop")

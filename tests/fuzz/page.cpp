@@ -18,7 +18,7 @@ struct Pictures : ves::LiveSource {
   const std::string& scene() const override { return scene_; }
   std::int64_t newest() const override { return number; }
   std::string pictures(std::int64_t, std::int64_t&) const override { return std::string(100, 'x'); }
-  void requestStop(std::int64_t) override {}
+  void take(const ves::PageMessage&) override {}
   std::int64_t number = 1;
   std::string scene_ = "{}";
 };

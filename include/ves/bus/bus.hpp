@@ -201,6 +201,7 @@ class ControllerLink {
   const Sample& sample() const noexcept { return sample_; }
   std::int64_t answers() const noexcept { return answers_; }  // lockstep: tick the sample answers
   std::int64_t sampleTime() const noexcept { return sample_time_; }  // [ns] sender's clock
+  std::int64_t samples() const noexcept { return samples_; }         // [-] taken, repeated ones too
   /// The oldest order that waits; none when none does. An order that is repeated, because its
   /// sender saw no answer, counts once; a hold and a stop go before what waits, which is overtaken.
   Order takeOrder() noexcept;
@@ -221,6 +222,7 @@ class ControllerLink {
   Sample sample_;
   std::int64_t answers_ = -2;
   std::int64_t sample_time_ = 0;
+  std::int64_t samples_ = 0;
   MachineHeard machine_;
   bool engaged_ = false;
   void receiveSample(const void* data, std::uint32_t size) noexcept;

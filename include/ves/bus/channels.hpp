@@ -21,6 +21,7 @@ inline const std::string kTiming = "VES_TIMING";
 inline const std::string kRobot = "VES_ROBOT";
 inline const std::string kOperator = "VES_OPERATOR";
 inline const std::string kQuery = "VES_QUERY";
+inline const std::string kPace = "VES_PACE";
 inline const std::string kSetup = "VES_SETUP";
 inline const std::string kExperiment = "VES_EXPERIMENT";
 

@@ -9,6 +9,7 @@
 #include <ves/experiment_t.hpp>
 #include <ves/leg_command_t.hpp>
 #include <ves/operator_t.hpp>
+#include <ves/pace_t.hpp>
 #include <ves/query_t.hpp>
 #include <ves/robot_command_t.hpp>
 #include <ves/sample_t.hpp>

@@ -95,6 +95,17 @@ std::optional<Motion> baseMotion(const Experiment& experiment, const Vec6& start
                                  const std::vector<TimedAction>* pushes = nullptr);
 
 /// Pushes on the machine in the first admittance segment, the program's and others, since it began.
+class ToldPushes {
+ public:
+  /// The next row; true when it tells of another push.
+  bool add(const Row& row);
+  const std::vector<TimedAction>& list() const { return list_; }
+
+ private:
+  std::optional<std::int64_t> start_;  // [ns] by the machine's clock
+  int seen_ = 0;
+  std::vector<TimedAction> list_;
+};
 std::vector<TimedAction> pushesOf(const Series& series);
 
 /// Whether the vehicle is the configuration's, which an order may have changed.

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// The run on the bus, as it happens. Only listens, but for two messages: it asks for the
-// configuration (VES_QUERY), and asks the controller that is shown to stop (VES_OPERATOR).
+// The run on the bus, as it happens. It asks for the configuration (VES_QUERY), and sends what a
+// page asks for: a stop and another vehicle to the controller that is shown (VES_OPERATOR), a push
+// (VES_ROBOT) and a pace (VES_PACE) to its machine, where all of that is simulated.
 #pragma once
 
 #include <cmath>
@@ -11,6 +12,7 @@
 #include <string>
 
 #include "ves/bus/bus.hpp"
+#include "ves/page/curves.hpp"
 #include "ves/page/scene.hpp"
 #include "ves/page/web_server.hpp"
 
@@ -29,11 +31,11 @@ class LiveRun : public LiveSource {
   const std::string& scene() const override { return scene_text_; }
   std::int64_t newest() const override { return newest_; }
   /// Three doubles {number, header.time_ns of the state, real-time factor} of the last one; then of
-  /// each, the oldest first, the floats of Scene::picture, the real-time factor, and 1 when a stop
-  /// was requested, 2 when the controller has taken it; little-endian. One of every state that was
-  /// heard: who draws seldom misses no sample.
+  /// each, the oldest first, the floats of Scene::picture, those of Asked for a stop and a vehicle,
+  /// the pace that was asked for last, whether it is lockstep, and those of Curves; little-endian.
+  /// One of every state that was heard: who draws seldom misses no sample.
   std::string pictures(std::int64_t after, std::int64_t& last) const override;
-  void requestStop(std::int64_t edition) override;
+  void take(const PageMessage& message) override;
 
  private:
   void takeState(const state_t& state);
@@ -49,8 +51,9 @@ class LiveRun : public LiveSource {
   Identity self_ = Identity::draw();
   std::int64_t sent_ = 0;  // [-] messages
 
-  Identity controller_;     // that is shown
-  std::int64_t heard_ = 0;  // [ns] its last state
+  Identity controller_;       // that is shown
+  std::int64_t machine_ = 0;  // [-] header.source of what it commands
+  std::int64_t heard_ = 0;    // [ns] its last state
   std::optional<state_t> state_;
   RowMaker rows_;
   std::optional<Row> row_;
@@ -63,9 +66,11 @@ class LiveRun : public LiveSource {
   std::deque<Picture> pictures_;  // of this scene, the last the newest
 
   std::optional<experiment_t> described_;  // the last
+  std::optional<setup_t> setup_;           // the last
   bool warned_ = false;                    // that it cannot be read
   std::optional<Experiment> experiment_;
   std::optional<Scene> scene_;
+  std::optional<Curves> curves_;
   std::string scene_text_;
   std::int64_t edition_ = 0;
   std::int64_t asked_ = 0;  // [ns]
@@ -76,6 +81,7 @@ class LiveRun : public LiveSource {
     std::int64_t tick;
     Vec6 x;  // [m, rad] from home
     bool computed;
+    ToldPushes pushes = {};
   };
   std::optional<LetGo> let_go_;
 
@@ -85,12 +91,20 @@ class LiveRun : public LiveSource {
   std::deque<Instant> instants_;  // of the last second
   double rate_ = NAN;             // [-] real-time factor
 
-  struct Stop {
+  /// An order that is repeated until it is answered.
+  struct Asked {
+    Order order;
     std::int64_t sequence, sent;  // [-], [ns]
     int times;                    // [-] to send it still
-    bool taken = false;
+    std::optional<Refusal> answer = {};
+
+    bool underWay() const { return !answer && times > 0; }
   };
-  std::optional<Stop> stop_;
+  void ask(std::optional<Asked>& asked, const Order& order, int times);
+  void repeat(std::optional<Asked>& asked);
+  void hearAnswer(std::optional<Asked>& asked, const state_t& state) const;
+  std::optional<Asked> stop_, vehicle_;
+  double pace_ = NAN;  // [-] asked for last
 };
 
 }  // namespace ves

@@ -21,9 +21,11 @@ class Scene {
   explicit Scene(const Experiment& experiment);
 
   /// What stays: "name", "frames" (name and parent of each, in the order of a picture's poses),
-  /// "size" [-] beside the report's platform, "shapes" (kind, frame, sizes [m]), "arm" (the line of
-  /// the arm at rest, in I [m]), "arm_radius" [m], "scalars" (names), "phases", "segments",
-  /// "checks".
+  /// "legs" (the joints of each, on the floor in I and below the platform in P [m]; frames leg1
+  /// and rod1 begin there, z along the leg), "size" [-] beside the report's platform, "shapes"
+  /// (kind, frame, sizes [m]), "arm" (the line of the arm at rest, in I [m]), "arm_radius" [m],
+  /// "emulates", "simulated", "target" (whether there is one), "scalars" (names), "phases",
+  /// "segments", "checks".
   const nlohmann::ordered_json& description() const { return description_; }
   /// Meshes that are not drawn, and why.
   const std::vector<std::string>& warnings() const { return warnings_; }

@@ -10,8 +10,26 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <variant>
+
+#include "ves/contract/plausible.hpp"
 
 namespace ves {
+
+/// What a page may send: "drawn", when it has shown a picture; and for the run of that edition of
+/// the scene "stop EDITION", "push EDITION platform|tool|target FX FY FZ SECONDS X Y Z" (N, m),
+/// "vehicle EDITION MASS DAMPING STIFFNESS SECONDS" (factors), "pace EDITION RATE".
+struct PageMessage {
+  struct Drawn {};
+  struct Stop {};
+  struct Pace {
+    double rate;  // [-] of real time
+  };
+  std::int64_t edition = 0;
+  std::variant<Drawn, Stop, PushOrder, VehicleOrder, Pace> what;
+};
+/// Nothing where it is none of these, or a number is out of range.
+std::optional<PageMessage> parsePageMessage(std::string_view text);
 
 /// What a page shows while it happens.
 class LiveSource {
@@ -23,7 +41,7 @@ class LiveSource {
   /// Those that came after that number, as far as they are kept and fit into a message, as bytes;
   /// `last` becomes the number of the last one.
   virtual std::string pictures(std::int64_t after, std::int64_t& last) const = 0;
-  virtual void requestStop(std::int64_t edition) = 0;
+  virtual void take(const PageMessage& message) = 0;
 };
 
 /// A socket that browsers connect to.
@@ -43,13 +61,6 @@ Listener listenOn(const std::string& address, std::optional<int> port);
 /// One that another process has made and left open to us.
 Listener inheritedListener(int descriptor, const std::string& token);
 
-/// What a page may send: "drawn", when it has shown a picture, and "stop EDITION".
-struct PageMessage {
-  enum class Kind { kDrawn, kStop } kind;
-  std::int64_t edition = 0;
-};
-std::optional<PageMessage> parsePageMessage(std::string_view text);
-
 /// What was not let in.
 struct WebRefusals {
   std::int64_t token = 0;      // [-] requests without the token
@@ -62,9 +73,9 @@ struct WebRefusals {
 
 class WebServer {
  public:
-  static constexpr int kMostConnections = 32;         // [-]
-  static constexpr int kMostMessages = 200;           // [1/s] of one page
-  static constexpr std::size_t kLongestMessage = 64;  // [B]
+  static constexpr int kMostConnections = 32;          // [-]
+  static constexpr int kMostMessages = 200;            // [1/s] of one page
+  static constexpr std::size_t kLongestMessage = 256;  // [B]
 
   /// `page` is what GET / answers; `live` may be none. Takes the listener's descriptor.
   WebServer(Listener listener, std::string page, LiveSource* live);

@@ -68,10 +68,11 @@ RunResult runRecorded(const Experiment& experiment, RunRecorder* recorder, const
 struct ProcessOptions {
   std::string url = kDefaultUrl;
   bool lockstep = false;
-  bool realtime = false;  // insist on SCHED_FIFO and locked memory
-  bool start = false;     // the program at once; else the controller waits for orders
-  std::string log;        // file, empty: none
-  std::string flight;     // folder of flight records, empty: none
+  std::optional<double> pace;  // [-] of real time, in lockstep; none: as fast as it goes
+  bool realtime = false;       // insist on SCHED_FIFO and locked memory
+  bool start = false;          // the program at once; else the controller waits for orders
+  std::string log;             // file, empty: none
+  std::string flight;          // folder of flight records, empty: none
 };
 
 /// The controller's process. Returns when the program is over, a check has stopped it, or the

@@ -72,6 +72,9 @@ Transform toolPose(const Experiment& experiment, const Vec6& x, const JointVecto
 /// [m] of x, y, z, or [rad] of the fixed angles.
 double coordinateOf(const Transform& X_IT, int i);
 
+/// Whether a push lasts.
+bool pushed(const truth_t& truth) noexcept;
+
 /// A column of the table; its name ends with its unit.
 struct Column {
   std::string name;
