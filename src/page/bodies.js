@@ -43,7 +43,7 @@ class Bodies {
     }
     this.arrows = {};
     for (const [name, colour] of Object.entries(ARROWS)) {
-      this.arrows[name] = arrowOf(colour);
+      this.arrows[name] = new Arrow(colour, Math.min(1, recording.scene.size));
       this.root.add(this.arrows[name]);
     }
     // White booms between dark joints, as the Shuttle's arm has them.
@@ -65,6 +65,14 @@ class Bodies {
     };
     this.trail = trail(look.colour || 0xc14e00);
     this.twinTrail = trail(GHOST);
+    // Names stand at an edge of what they name, and not in its middle.
+    const plate = recording.scene.shapes.find(s => s.kind === 'plate' && s.frame === 'platform');
+    this.edges = ['platform', 'base'].map((frame, k) => {
+      const edge = new THREE.Object3D(), corner = plate.corners.reduce((a, b) => 3 * b[0] + 2 * b[1] > 3 * a[0] + 2 * a[1] ? b : a);
+      edge.position.set(corner[0], corner[1], plate.top - 0.06 * k * recording.scene.size);
+      this.frames[frame].add(edge);
+      return edge;
+    });
     this.led = recording.scene.frames.some(f => f.name === 'tool') ? 'tool' : 'platform';
   }
   remove() { this.world.remove(this.root); }
@@ -150,8 +158,7 @@ class Bodies {
       one.visible = at !== null && length > 0.02 * size && isFinite(length);
       if (!one.visible) return;
       one.position.copy(at);
-      one.setDirection(force.normalize());
-      one.setLength(Math.min(length, 3 * size), 0.08 * size, 0.05 * size);
+      one.point(force, Math.min(length, 3 * size));
     };
     arrow('wrench', r.vector(i, ['fx_dynamic', 'fy_dynamic', 'fz_dynamic']), this.frames.platform.position);
     // On the line along which it acts, at the place nearest to the tool.
@@ -180,15 +187,28 @@ class Bodies {
   }
 }
 
-/** Drawn over everything: a force that begins inside a body is seen. */
-function arrowOf(colour) {
-  const arrow = new THREE.ArrowHelper(AHEAD, new THREE.Vector3(), 0.1, colour, 0.08, 0.05);
-  for (const part of [arrow.line, arrow.cone]) {
-    part.renderOrder = 1;
-    part.material.depthTest = false;
-    part.material.transparent = true;
+/** From its origin, drawn over everything: a force that begins inside a body is seen. */
+class Arrow extends THREE.Group {
+  constructor(colour, size) {
+    super();
+    this.head = 0.1 * size;
+    const material = new THREE.MeshBasicMaterial({color: colour, depthTest: false, transparent: true});
+    const part = geometry => {
+      const mesh = new THREE.Mesh(geometry, material);
+      mesh.renderOrder = 1;
+      this.add(mesh);
+      return mesh;
+    };
+    this.shaft = part(new THREE.CylinderBufferGeometry(0.008 * size, 0.008 * size, 1, 12).translate(0, 0.5, 0));
+    this.cone = part(new THREE.CylinderBufferGeometry(0, 0.03 * size, this.head, 16));
+    this.visible = false;
   }
-  return arrow;
+  /** `length` [m] along `way`. */
+  point(way, length) {
+    this.quaternion.setFromUnitVectors(UP, way.clone().normalize());
+    this.shaft.scale.y = Math.max(1e-6, length - 0.5 * this.head);
+    this.cone.position.y = length - 0.5 * this.head;
+  }
 }
 
 /** `look`: colour and opacity in place of its own; outline: edges, and hardly a surface. */

@@ -108,8 +108,7 @@ class Live {
   /** Shift and the mouse: an arrow from what is under it, a force when it is let go. */
   touch() {
     const canvas = stage.canvas;
-    this.arrow = arrowOf(ARROWS.push);
-    this.arrow.visible = false;
+    this.arrow = new Arrow(ARROWS.push, 1);
     stage.world.add(this.arrow);
     canvas.addEventListener('pointerdown', event => {
       if (element('touch').hidden || !(event.shiftKey || element('hand').checked)) return;
@@ -130,8 +129,7 @@ class Live {
       const length = this.drag.force.length() * 0.02 * first.scene.size;
       this.arrow.visible = length > 0;
       this.arrow.position.copy(this.drag.frame.localToWorld(this.drag.local.clone()));
-      if (length > 0) this.arrow.setDirection(this.drag.force.clone().normalize());
-      this.arrow.setLength(Math.max(length, 1e-6), 0.08 * first.scene.size, 0.05 * first.scene.size);
+      if (length > 0) this.arrow.point(this.drag.force, length);
       show(shown);
     }, true);
     const end = push => {

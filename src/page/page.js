@@ -26,7 +26,7 @@ function begin(recordings) {
   element('times').disabled = first.scene.shapes.some(s => s.world);
   element('times').title = element('times').disabled ? 'not where the tool may touch something' : 'every motion so much larger';
   if (element('times').disabled) element('times').value = 0;
-  const b = bodies[0].frames, named = [['platform', b.platform], ['base in free space', b.base, 'ghost']];
+  const b = bodies[0].frames, [edge, twin] = bodies[0].edges, named = [['platform', edge], ['base in free space', twin, 'ghost']];
   if (b.tool) named.push(['tool', b.tool]);
   if (b.target) named.push(['target', b.target]);
   stage.label(named);
