@@ -20,6 +20,7 @@
 #include <thread>
 #include <vector>
 
+#include "help.hpp"
 #include "ves/analysis/leaning.hpp"
 #include "ves/config/experiment.hpp"
 #include "ves/run/run.hpp"
@@ -103,10 +104,27 @@ inline std::filesystem::path configFolder() {
   return here || !std::filesystem::exists(installed, error) ? "config" : installed;
 }
 
-/// A run's folder stands for the log in it.
+/// The folder of the run that was made last; refused where there is none.
+inline std::filesystem::path newestRun() {
+  std::error_code error;
+  std::filesystem::path newest;
+  std::filesystem::file_time_type when;
+  for (const auto& entry : std::filesystem::directory_iterator("ves-runs", error)) {
+    const std::filesystem::path log = entry.path() / "run.lcmlog";
+    const auto written = std::filesystem::last_write_time(log, error);
+    if (error || (!newest.empty() && written <= when)) continue;
+    newest = entry.path();
+    when = written;
+  }
+  if (newest.empty()) throw CLI::ValidationError("newest: there is no run in ves-runs");
+  return newest;
+}
+
+/// A run's folder stands for the log in it; `newest` for the run in ves-runs that was made last.
 inline std::string logOf(const std::string& given) {
   std::error_code error;
-  const std::filesystem::path path(given);
+  const bool named = given == "newest" && !std::filesystem::exists(given, error);
+  const std::filesystem::path path = named ? newestRun() : std::filesystem::path(given);
   return std::filesystem::is_directory(path, error) ? (path / "run.lcmlog").string() : given;
 }
 inline CLI::Option* asLog(CLI::Option* option) { return option->transform(logOf); }
@@ -255,6 +273,8 @@ inline std::string shortened(std::string text) {
 
 /// Parses, runs, and turns bad input into one line and status 2.
 inline int run(CLI::App& cli, int argc, char** argv, const std::function<int()>& body) {
+  cli.formatter(std::make_shared<EightyColumns>());
+  for (CLI::App* sub : cli.get_subcommands({})) sub->formatter(cli.get_formatter());
   if (argc == 2 && std::string_view(argv[1]) == kWords) {
     printWords(cli);
     return kDone;

@@ -12,6 +12,7 @@ namespace ves::app {
 namespace {
 
 constexpr std::int64_t kFirstSample = 10'000'000'000;  // [ns]
+constexpr std::int64_t kTold = 1'000'000'000;          // [ns] of silence
 constexpr std::int64_t kHello = 100'000'000;           // [ns] between commands that engage nothing
 
 /// Engages nothing; says that it is there.
@@ -28,7 +29,11 @@ std::vector<Requirement> listen(const Experiment& experiment, const std::string&
     if (!judge) judge.emplace(setup, monotonicNow());
     judge->take(data, size, monotonicNow());
   });
-  while (!judge && !stop_requested && monotonicNow() - start < kFirstSample) bus.wait(100);
+  for (bool announced = false; !judge && !stop_requested && monotonicNow() - start < kFirstSample;
+       bus.wait(100))
+    if (monotonicNow() - start > kTold && !std::exchange(announced, true))
+      fmt::print(stderr,
+                 "waiting up to 10 s for samples on {}: a driver, or ./ves plant SCENARIO\n", url);
   if (!judge) return {{"samples", "heard", "none in 10 s", false}};
   const std::int64_t end = monotonicNow() + static_cast<std::int64_t>(seconds * 1e9);
   const leg_command_t hello = toMessage(LegCommand(), header(self, -1, 0));

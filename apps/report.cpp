@@ -23,12 +23,12 @@ int reportCommand(int argc, char** argv) {
     const std::filesystem::path folder = claimFolder(out);
     const bool terminal = isatty(STDERR_FILENO);
     const std::int64_t start = monotonicNow();
-    const Chapter4 chapter =
-        reproduceChapter4(configFolder(), folder, workers, [&](const std::string& what, int run) {
-          fmt::print(stderr, "{}run {:3}  {:<32}{}", terminal ? "\r" : "", run, what,
-                     terminal ? "" : "\n");
+    const Chapter4 chapter = reproduceChapter4(
+        configFolder(), folder, workers, [&](const std::string& what, int run, int done, int of) {
+          fmt::print(stderr, "{}{:2} of {} parts, run {:3}  {:<32}{}", terminal ? "\r" : "", done,
+                     of, run, what, terminal ? "" : "\n");
         });
-    if (terminal) fmt::print(stderr, "\r{:40}\r", "");
+    if (terminal) fmt::print(stderr, "\r{:70}\r", "");
     writeFile(folder / "report.html", chapter.html);
     writeSummary(chapter.summary, (folder / "summary.json").string());
     for (const auto& claim : chapter.summary["claims"])

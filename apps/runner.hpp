@@ -20,12 +20,14 @@ inline constexpr int kRecorderPriority = 10;  // [-] SCHED_FIFO, below both proc
 
 struct RunnerOptions : Options {
   std::string out;
+  bool overwrite = false;
   bool two_processes = false;
   bool plots = true;
   bool view = false;
 
   void addOut(CLI::App& cli) {
     cli.add_option("--out", out, "folder for the results; a new one in ves-runs by default");
+    cli.add_flag("--overwrite", overwrite, "where a run is in that folder already");
   }
   void addView(CLI::App& cli) {
     cli.add_flag("--view", view, "show it in a browser meanwhile; prints the address");
@@ -49,6 +51,9 @@ inline LaunchOptions prepareFolder(RunnerOptions& options, const Experiment& exp
           ? claimNewFolder(fmt::format("ves-runs/{}-{:%Y%m%d-%H%M%S}", experiment.name,
                                        fmt::localtime(std::time(nullptr))))
           : claimFolder(options.out);
+  if (!options.overwrite && std::filesystem::exists(folder / "run.lcmlog"))
+    throw InputError(
+        fmt::format("--out {}: a run is there already, want another or --overwrite", options.out));
   LaunchOptions launch;
   launch.program = ownProgram();
   launch.scenario = folder / "experiment.yaml";

@@ -47,6 +47,24 @@ constexpr Command kCommands[] = {
      doctorCommand},
 };
 
+constexpr const char* kExamples =
+    "ves demo --view                            the main job, in a browser too\n"
+    "ves run                                    what scenarios there are\n"
+    "ves run srms_capture_doss --lockstep       one of them, as fast as it goes\n"
+    "ves run ramp --set controller.rate_hz=200  with another value; ves keys lists them\n"
+    "ves view newest                            the last run in a browser\n"
+    "ves view RUN --video run.mp4               as a film\n"
+    "ves replay newest --check                  through the controller again, bit for bit\n"
+    "ves compare RUN RUN                        what differs between two runs\n"
+    "ves controller puma_on_table_4_1 --plant   by hand, from a menu\n"
+    "ves sweep ramp --vary seed=1:100           one row a run\n";
+constexpr const char* kFiles =
+    "ves-runs/SCENARIO-DATE/     a run: experiment.yaml, run.lcmlog, series.csv, summary.json\n"
+    "ves-runs/calibration.yaml   the last calibration from the menu\n"
+    "/usr/share/ves/config/      bases, robots, platforms, scenarios as they are installed\n"
+    "/usr/share/doc/ves/         the manual, examples, lessons\n"
+    "/usr/share/ves/lcmtypes/    the messages on the bus\n";
+
 /// What the command prints on that option.
 std::string printed(const Command& command, std::string option) {
   std::string name = command.name;
@@ -104,9 +122,11 @@ void printManual() {
                forTroff(help.substr(usage)));
   }
   fmt::print(
+      ".SH EXAMPLES\n.nf\n{}.fi\n.SH FILES\n.nf\n{}.fi\n"
       ".SH EXIT STATUS\n0: done. 1: a check stopped the run, or a comparison failed. 2: bad "
       "input, in one line.\n.SH ENVIRONMENT\nVES_CONFIG_DIR: the folder of bases, robots and "
-      "scenarios.\n");
+      "scenarios.\n.br\nLCM_DEFAULT_URL: the bus, where \\-\\-url does not name one.\n",
+      forTroff(kExamples), forTroff(kFiles));
 }
 
 void printUsage(FILE* to) {

@@ -159,12 +159,12 @@ int servePage(const ViewOptions& options) {
 int viewCommand(int argc, char** argv) {
   CLI::App cli(
       "The run on the bus, or a recorded one, in a browser: platform, legs, robot, force, flexible "
-      "arm, and where the base in free space would be. A second log is laid over the first.",
+      "arm, and where the base in free space would be. Further logs are laid over the first.",
       "ves view");
   ViewOptions options;
   asLog(cli.add_option("log", options.logs,
-                       "folders or LCM event logs of one run, or two; none: the run on the bus"))
-      ->expected(0, 2);
+                       "folders or LCM event logs of up to four runs; none: the run on the bus"))
+      ->expected(0, 4);
   auto* html = cli.add_option("--html", options.html,
                               "write one file that a browser opens from disk, and serve nothing");
   auto* svg =

@@ -3,6 +3,8 @@
 // The functions of the Python package `ves`, as C++ has them. Arrays arrive checked: shapes, finite
 // numbers, names and units are the business of ves/__init__.py, which documents them.
 #include <fmt/format.h>
+#include <filesystem>
+
 #include <pybind11/complex.h>
 #include <pybind11/eigen.h>
 #include <pybind11/pybind11.h>
@@ -249,7 +251,9 @@ py::tuple runOf(const Path& file, const Strings& overrides) {
 PYBIND11_MODULE(_core, m) {
   using namespace ves;
   m.attr("version") = describeBuild();
-  m.attr("config") = VES_PYTHON_CONFIG;
+  // Of the checkout that it was built in, or as it is installed.
+  const bool built_here = std::filesystem::exists(VES_PYTHON_CONFIG "/ves.yaml");
+  m.attr("config") = built_here ? VES_PYTHON_CONFIG : "/usr/share/ves/config";
   py::register_exception<InputError>(m, "InputError", PyExc_ValueError);
 
   py::class_<Geometry>(m, "Geometry")

@@ -335,7 +335,7 @@ TEST_F(Identify, PlanRunMassesAndTheirUse) {
                        file("plan.yaml"))
                   .status,
               0);
-    ASSERT_EQ(run(file("plan.yaml") + " --lockstep --no-plots" + out("run")).status, 0);
+    ASSERT_EQ(run(file("plan.yaml") + " --lockstep --no-plots --overwrite" + out("run")).status, 0);
     const test::Output masses = test::sh(app("identify") + "masses " + file("run/run.lcmlog") +
                                          " --out " + file("masses.yaml"));
     ASSERT_EQ(masses.status, 0) << masses.text;

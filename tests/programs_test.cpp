@@ -41,7 +41,8 @@ TEST_F(Programs, TheReferenceOfKeysIsWhatTheProgramPrints) {
   const std::string page((std::istreambuf_iterator<char>(in)), {});
   EXPECT_TRUE(page.ends_with(o.text)) << "docs/scenario.md: ./ves keys --markdown prints its end";
   EXPECT_NE(sh(app("keys") + "controler").text.find("did you mean controller?"), std::string::npos);
-  EXPECT_NE(sh(app("keys") + "program.trajectory.z").text.find("counted from home"), std::string::npos);
+  EXPECT_NE(sh(app("keys") + "program.trajectory.z").text.find("counted from home"),
+            std::string::npos);
 }
 
 TEST_F(Programs, TrippedRunEndsWithOne) {
@@ -68,6 +69,54 @@ TEST_F(Programs, BadInputIsOneLineAndStatusTwo) {
   EXPECT_NE(run("no_such_scenario").text.find("want one of alpha_sine, arm_on_desk"),
             std::string::npos);
   EXPECT_NE(run("z_sin").text.find("did you mean 'z_sine'?"), std::string::npos);
+}
+
+TEST_F(Programs, HelpAndProgressFitATerminal) {
+  const auto widest = [](const std::string& text) {
+    std::size_t most = 0;
+    std::istringstream lines(text);
+    for (std::string line; std::getline(lines, line);) most = std::max(most, line.size());
+    return most;
+  };
+  for (const char* command :
+       {"run",           "demo",          "view",          "controller",     "plant",
+        "replay",        "collect",       "plot",          "compare",        "keys",
+        "srms simulate", "stability map", "identify plan", "identify servo", "sweep",
+        "faults",        "platform",      "robot",         "conform",        "on-bus",
+        "netft-server",  "report",        "doctor"}) {
+    const Output help = test::sh(app(command) + "--help");
+    EXPECT_EQ(help.status, 0) << command;
+    EXPECT_LE(widest(help.text), 80u) << command << help.text;
+  }
+  const Output o =
+      test::sh(app("run") + "puma_tilt --lockstep --no-plots" + out("a") + " 2>&1 >/dev/null");
+  EXPECT_LE(widest(o.text), 80u) << o.text;
+  EXPECT_NE(o.text.find("calibration"), std::string::npos) << o.text;
+}
+
+TEST_F(Programs, ARunThatIsThereIsKept) {
+  ASSERT_EQ(run("ramp --lockstep --no-plots" + out("a")).status, 0);
+  const std::string before = test::readText((folder_ / "a/summary.json").string());
+  const Output o = run("ramp --seed 5 --lockstep --no-plots" + out("a"));
+  EXPECT_EQ(o.status, 2);
+  EXPECT_NE(o.text.find("a run is there already, want another or --overwrite"), std::string::npos);
+  EXPECT_EQ(test::readText((folder_ / "a/summary.json").string()), before);
+  EXPECT_EQ(run("ramp --seed 5 --lockstep --no-plots --overwrite" + out("a")).status, 0);
+  EXPECT_NE(test::readText((folder_ / "a/summary.json").string()), before);
+}
+
+TEST_F(Programs, TheNewestRunHasAName) {
+  const std::string here = "cd '" + folder_.string() + "' && ";
+  const Output none = test::sh(here + app("replay") + "newest");
+  EXPECT_EQ(none.status, 2);
+  EXPECT_NE(none.text.find("newest: there is no run in ves-runs"), std::string::npos) << none.text;
+  for (const char* name : {"ramp", "z_sine"})
+    ASSERT_EQ(test::sh(here + app("run") + name + " --lockstep --no-plots").status, 0);
+  const auto table = [&](const std::string& log) {
+    return test::sh(here + app("collect") + log + " --select z_ --rate 1").text;
+  };
+  EXPECT_EQ(table("newest"), table("ves-runs/z_sine-*"));
+  EXPECT_NE(table("newest"), table("ves-runs/ramp-*"));
 }
 
 TEST_F(Programs, RunAloneNamesWhatThereIs) {

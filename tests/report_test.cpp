@@ -214,9 +214,9 @@ TEST(Chapter4, EveryClaimHasItsVerdict) {
   const fs::path folder = fs::temp_directory_path() / ("ves_chapter4_" + std::to_string(getpid()));
   fs::create_directories(folder);
   int runs_told = 0;
-  const Chapter4 chapter =
-      reproduceChapter4(test::configDir(), folder, 2,
-                        [&](const std::string&, int run) { EXPECT_EQ(run, ++runs_told); });
+  const Chapter4 chapter = reproduceChapter4(
+      test::configDir(), folder, 2,
+      [&](const std::string&, int run, int, int) { EXPECT_EQ(run, ++runs_told); });
   EXPECT_GT(runs_told, 200);
   EXPECT_TRUE(fs::is_empty(folder));
   fs::remove_all(folder);

@@ -136,8 +136,8 @@ TEST_F(Sweep, RowsDoNotDependOnTheWorkersNorOnAKill) {
 TEST_F(Sweep, RowIsWhatRunSaysOfTheSameValues) {
   ASSERT_EQ(sweep("z_sine --vary legs.K_P=8000,9000 --vary seed=3,4" + out("s")).status, 0);
   for (const auto& row : rows(folder_ / "s/sweep.csv")) {
-    ASSERT_EQ(run("z_sine --lockstep --no-plots --set legs.K_P=" + row.at("legs.K_P") + " --seed " +
-                  row.at("seed") + out("r"))
+    ASSERT_EQ(run("z_sine --lockstep --no-plots --overwrite --set legs.K_P=" + row.at("legs.K_P") +
+                  " --seed " + row.at("seed") + out("r"))
                   .status,
               0);
     const auto s = summary(folder_ / "r");

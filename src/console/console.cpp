@@ -15,6 +15,7 @@
 #include "ves/console/command.hpp"
 #include "ves/console/form.hpp"
 #include "ves/core/coordinates.hpp"
+#include "ves/core/lines.hpp"
 #include "ves/evaluation/evidence.hpp"
 #include "ves/realtime/realtime.hpp"
 #include "ves/run/session.hpp"
@@ -23,7 +24,8 @@
 namespace ves {
 namespace {
 
-constexpr int kTurn = 50;  // [ms] between looks at what happens
+constexpr int kTurn = 50;             // [ms] between looks at what happens
+constexpr std::size_t kColumns = 80;  // of a terminal
 
 class Console {
  public:
@@ -70,21 +72,52 @@ class Console {
   void say(const std::string& text) {
     // Not fmt::print: it throws when nobody reads, and that must not end a run.
     if (!prompt_.empty()) std::fputs("\r\033[K", stdout);
-    std::fputs((text + "\n" + prompt_).c_str(), stdout);
+    if (!status_.empty()) std::fputs("\033[1A\033[K", stdout);
+    std::fputs((text + "\n" + (status_.empty() ? "" : status_ + "\n") + prompt_).c_str(), stdout);
     std::fflush(stdout);
+  }
+
+  void greet() {
+    std::string words;
+    for (const Item& item : menu())
+      words += fmt::format("{}{}", words.empty() ? "" : " ", item.word);
+    say(wrapped(words, kColumns));
+    say("`help`: what each does. Ctrl-C: home, and done.");
   }
 
   void help() {
     for (std::size_t i = 0; i < menu().size(); ++i)
       say(fmt::format("  {:>2} {:<13}{}", i + 1, menu()[i].word, menu()[i].what));
-    say("A number, a word or its beginning; lengths in mm, angles in deg. A word alone asks for "
-        "the "
-        "rest;\n`back` leaves its questions, `hold` and `stop` act at once. In one line, for "
-        "example:\ntrajectory 3 z sine 200 0.5, or: move in 4 x 50 beta 4. Ctrl-C: home, and "
-        "done.");
+    say(
+        wrapped("A number, a word or its beginning; lengths in mm, angles in deg. A word alone "
+                "asks for the rest; `back` leaves its questions, `hold` and `stop` act at once. In "
+                "one line, for example: trajectory 3 z sine 200 0.5, or: move in 4 x 50 beta 4. "
+                "Ctrl-C: home, and done.",
+                kColumns));
+  }
+
+  /// Above the prompt, renewed in its place; what is being typed stays.
+  void showStatus(const state_t& s) {
+    constexpr std::int64_t kRenewed = 200'000'000;  // [ns]
+    if (status_.empty() || monotonicNow() - renewed_ < kRenewed) return;
+    renewed_ = monotonicNow();
+    status_ = statusLine(s);
+    std::fputs(("\0337\033[1A\r\033[K" + status_ + "\0338").c_str(), stdout);
+    std::fflush(stdout);
+  }
+
+  std::string statusLine(const state_t& s) const {
+    return fmt::format(
+        "[{} {:.1f} s{}] x {:+.1f} y {:+.1f} z {:+.1f} mm, {:+.2f} {:+.2f} {:+.2f} deg",
+        name(static_cast<Phase>(s.phase)),
+        static_cast<double>(s.header.sequence * experiment_.controller.period) *
+            kSecondPerNanosecond,
+        s.latched ? ", checks latched" : "", s.x[0] / kMillimetre, s.x[1] / kMillimetre,
+        s.x[2] / kMillimetre, s.x[3] / kDegree, s.x[4] / kDegree, s.x[5] / kDegree);
   }
 
   void notice(const state_t& s) {
+    showStatus(s);
     const auto phase = static_cast<Phase>(s.phase);
     const auto kind = static_cast<SegmentKind>(s.kind);
     if (phase != phase_ || kind != kind_ || s.segment != segment_) {
@@ -152,6 +185,8 @@ class Console {
   /// One line of input; nothing at its end, after Ctrl-C, or when the controller has ended.
   std::optional<std::string> line(const std::string& prompt) {
     prompt_ = terminal_ ? prompt : "";
+    if (terminal_ && session_->state()) status_ = statusLine(*session_->state());
+    if (!status_.empty()) std::fputs((status_ + "\n").c_str(), stdout);
     std::fputs(prompt_.c_str(), stdout);
     std::fflush(stdout);
     std::optional<std::string> out;
@@ -170,11 +205,12 @@ class Console {
     }
     if (!out && terminal_) std::fputs("\n", stdout);
     prompt_.clear();
+    status_.clear();
     return out;
   }
 
   void ask() {
-    if (terminal_) help();
+    if (terminal_) greet();
     while (!over()) {
       auto text = line("> ");
       if (!text) return;
@@ -333,6 +369,8 @@ class Console {
   std::vector<Command> script_;
   bool failed_ = false;
   std::string prompt_, input_;
+  std::string status_;        // the line above an open prompt
+  std::int64_t renewed_ = 0;  // [ns]
   Phase phase_ = Phase::kParked;
   SegmentKind kind_ = SegmentKind::kCount;
   std::int32_t segment_ = -1;

@@ -44,19 +44,30 @@ class Drawing {
     add(corners, 0.0, true, fmt::format("fill=\"{}\"", colour));
   }
 
+  /// What is there, told beside the drawing.
+  void caption(const Vec3& p, const char* text) { captions_.push_back({seen(p), text}); }
+
+  struct Caption {
+    Eigen::Vector2d at;
+    const char* text;
+  };
+  const std::vector<Caption>& captions() const { return captions_; }
   const std::vector<Thing>& things() const { return things_; }
   const Eigen::AlignedBox2d& box() const { return box_; }
 
  private:
+  static Vec3 eye() { return Vec3(0.62, -0.95, 0.5).normalized(); }
+  static Eigen::Vector2d seen(const Vec3& p) {
+    const Vec3 right = Vec3::UnitZ().cross(eye()).normalized(), up = eye().cross(right);
+    return {right.dot(p), -up.dot(p)};
+  }
   void add(const std::vector<Vec3>& points, double width, bool closed, std::string look) {
-    const Vec3 eye = Vec3(0.62, -0.95, 0.5).normalized();
-    const Vec3 right = Vec3::UnitZ().cross(eye).normalized(), up = eye.cross(right);
     Thing thing;
     thing.closed = closed;
     thing.look = std::move(look);
     for (const Vec3& p : points) {
-      thing.depth += eye.dot(p) / static_cast<double>(points.size());
-      thing.at.push_back({right.dot(p), -up.dot(p)});
+      thing.depth += eye().dot(p) / static_cast<double>(points.size());
+      thing.at.push_back(seen(p));
       const Eigen::Vector2d room = Eigen::Vector2d::Constant(0.5 * width);
       box_.extend(thing.at.back() - room).extend(thing.at.back() + room);
     }
@@ -64,16 +75,40 @@ class Drawing {
   }
 
   std::vector<Thing> things_;
+  std::vector<Caption> captions_;
   Eigen::AlignedBox2d box_;
 };
+
+/// To the right of it, those above first, each with a line to its place.
+std::string captions(std::vector<Drawing::Caption> all, const Eigen::AlignedBox2d& box) {
+  std::sort(all.begin(), all.end(),
+            [](const auto& a, const auto& b) { return a.at.y() < b.at.y(); });
+  const double size = 0.032 * box.sizes().y(), x = box.max().x() + size;
+  double lowest = box.min().y();
+  std::string out;
+  for (const Drawing::Caption& c : all) {
+    const double y = lowest = std::max(c.at.y(), lowest + 1.6 * size);
+    out += fmt::format(
+        "<polyline points=\"{:.3f},{:.3f} {:.3f},{:.3f}\" fill=\"none\" stroke=\"#888888\" "
+        "stroke-width=\"{:.4f}\"/>\n<text x=\"{:.3f}\" y=\"{:.3f}\" font-size=\"{:.3f}\" "
+        "font-family=\"sans-serif\" fill=\"#767676\">{}</text>\n",
+        c.at.x(), c.at.y(), x - 0.3 * size, y, 0.06 * size, x, y + 0.35 * size, size, c.text);
+  }
+  return out;
+}
 
 /// One drawing, or several of the same things as they move, the last one `seconds` after the first;
 /// those behind first.
 std::string svg(const std::vector<Drawing>& drawings, double seconds) {
+  constexpr double kTold = 0.75;  // [-] of the height, for captions
   Eigen::AlignedBox2d box;
   for (const Drawing& d : drawings) box.extend(d.box());
   const Eigen::Vector2d margin = Eigen::Vector2d::Constant(0.03 * box.diagonal().norm());
-  const Eigen::Vector2d low = box.min() - margin, size = box.sizes() + 2.0 * margin;
+  const std::vector<Drawing::Caption>& told = drawings.front().captions();
+  Eigen::AlignedBox2d room = box;
+  if (!told.empty())  // for letters about half as wide as high
+    room.extend(Eigen::Vector2d(box.max() + Eigen::Vector2d(kTold * box.sizes().y(), 0.0)));
+  const Eigen::Vector2d low = room.min() - margin, size = room.sizes() + 2.0 * margin;
   std::string out = fmt::format(
       "<svg viewBox=\"{:.4f} {:.4f} {:.4f} {:.4f}\" xmlns=\"http://www.w3.org/2000/svg\">\n",
       low.x(), low.y(), size.x(), size.y());
@@ -99,7 +134,7 @@ std::string svg(const std::vector<Drawing>& drawings, double seconds) {
                        seconds, values, kind)
                  : "/>\n";
   }
-  return out + "</svg>\n";
+  return out + captions(told, box) + "</svg>\n";
 }
 
 constexpr const char* kMetal = "#8d99a6";
@@ -191,6 +226,20 @@ std::string moving(const Series& series, const MovingOptions& options) {
     const double next = options.from + static_cast<double>(drawings.size()) / options.rate;
     if (row.t < next - 0.5e-9 || row.t > options.to) continue;
     drawings.push_back(drawn(scene, scene.picture(row, {}), StillView::kPlatform));
+    if (drawings.size() > 1) continue;
+    const Experiment& e = series.experiment;
+    const Transform X_IP = e.plant.geometry.fromHome(Pose::from(Vec6::Map(row.truth.x)));
+    const LinkPoses links = linkPoses(e.plant.payload.robot, JointVector::Map(row.truth.q));
+    Drawing& first = drawings.back();
+    if (const NamedFrame* tool = e.robot.tool())
+      first.caption(X_IP * (e.plant.payload.X_PL0() * tool->pose(links).p), "a robot moves");
+    first.caption(X_IP * e.plant.payload.X_PS.p, "a sensor under it feels its forces");
+    const std::size_t corner = 0;
+    first.caption(X_IP * e.plant.geometry.p_PPi_P[corner],
+                  "the platform goes where a vehicle would");
+    first.caption(
+        0.5 * (X_IP * e.plant.geometry.p_PPi_P[corner] + e.plant.geometry.p_IBi_I[corner]),
+        "on six hydraulic legs");
   }
   if (drawings.empty())
     throw InputError(fmt::format("nothing between {} and {} s: the log has 0 to {:.2f} s",

@@ -20,7 +20,10 @@ void gnuplot(const std::string& script, const std::filesystem::path& folder) {
   std::ofstream(file) << fmt::format("cd {}\n{}", quoted(folder.string()), script);
   std::string quoted_file = "'";
   for (const char c : file.string()) quoted_file += c == '\'' ? "'\\''" : std::string(1, c);
-  if (std::FILE* program = popen(("gnuplot " + quoted_file + "'").c_str(), "w")) pclose(program);
+  // Of what it says errors are worth a line, and its warnings of empty panels are not.
+  const std::string command =
+      "gnuplot " + quoted_file + "' 2>&1 >/dev/null | grep -v -e warning -e '^ *$' >&2";
+  if (std::FILE* program = popen(command.c_str(), "w")) pclose(program);
   std::error_code none;
   std::filesystem::remove(file, none);
 }

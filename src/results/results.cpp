@@ -92,11 +92,16 @@ void Progress::show(Phase phase, int segment, std::int64_t tick, const double (&
         segment + 1, experiment_.controller.program.size);
   const double t = static_cast<double>(tick * experiment_.controller.period) * kSecondPerNanosecond;
   // Not fmt::print: it throws when nobody reads, and that must not end a run.
-  const std::string line = fmt::format(
-      "{}{:7.2f} s  {:<24} x {:+6.1f}  y {:+6.1f}  z {:+6.1f} mm   alpha {:+6.2f}  beta "
-      "{:+6.2f}  gamma {:+6.2f} deg{}",
-      terminal ? "\r" : "", t, what, x[0] * 1e3, x[1] * 1e3, x[2] * 1e3, x[3] / kDegree,
-      x[4] / kDegree, x[5] / kDegree, terminal ? "" : "\n");
+  const std::string line =
+      fmt::format("{}{:7.2f} s {:<21}{:+6.1f}{:+7.1f}{:+7.1f} mm{:+7.2f}{:+7.2f}{:+7.2f} deg{}",
+                  terminal ? "\r" : "", t, what, x[0] * 1e3, x[1] * 1e3, x[2] * 1e3, x[3] / kDegree,
+                  x[4] / kDegree, x[5] / kDegree, terminal ? "" : "\n");
+  if (!headed_)
+    std::fputs(fmt::format("{:>9} {:<21}{:>6}{:>7}{:>7}{:>10}{:>7}{:>7}\n", "", "", "x", "y", "z",
+                           "alpha", "beta", "gamma")
+                   .c_str(),
+               stderr);
+  headed_ = true;
   std::fputs(line.c_str(), stderr);
   open_ = terminal;
 }

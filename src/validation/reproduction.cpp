@@ -47,7 +47,15 @@ void Reproduction::append(const Reproduction& piece) {
 void Reproduction::parts(std::size_t n,
                          const std::function<void(Reproduction&, std::size_t)>& write) {
   std::vector<Reproduction> pieces(n, piece());
-  tbb::parallel_for(std::size_t{0}, n, [&](std::size_t i) { write(pieces[i], i); });
+  const auto count = [&](int& of, std::size_t more) {
+    const std::lock_guard<std::mutex> lock(shared_->mutex);
+    of += static_cast<int>(more);
+  };
+  count(shared_->parts, n);
+  tbb::parallel_for(std::size_t{0}, n, [&](std::size_t i) {
+    write(pieces[i], i);
+    count(shared_->parts_done, 1);
+  });
   for (const Reproduction& one : pieces) append(one);
 }
 
@@ -67,7 +75,7 @@ Experiment Reproduction::load(const std::string& scenario, const Overrides& set)
 Reproduction::Run Reproduction::record(const std::string& name, const Experiment& e) {
   {
     const std::lock_guard<std::mutex> lock(shared_->mutex);
-    shared_->progress(name, ++shared_->runs);
+    shared_->progress(name, ++shared_->runs, shared_->parts_done, shared_->parts);
   }
   return recordLockstep(e);
 }
@@ -115,7 +123,7 @@ std::string letGo(const CoupledMode& mode) {
 }
 
 Chapter4 reproduceChapter4(const fs::path& config, const fs::path& folder, int workers,
-                           const std::function<void(const std::string&, int)>& progress) {
+                           const std::function<void(const std::string&, int, int, int)>& progress) {
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
                                   static_cast<std::size_t>(workers));
   Reproduction r(config, folder, progress);

@@ -51,8 +51,9 @@ class Reproduction {
  public:
   using Run = RecordedRun;
 
-  /// Told each run's name and number, by one thread at a time.
-  using Progress = std::function<void(const std::string&, int)>;
+  /// Told each run's name and number, and how many parts of those begun are done, by one thread at
+  /// a time.
+  using Progress = std::function<void(const std::string&, int run, int done, int of)>;
 
   /// Throws InputError where `config` has no claims.yaml.
   Reproduction(std::filesystem::path config, const std::filesystem::path& folder,
@@ -94,7 +95,7 @@ class Reproduction {
     Claims claims;
     Progress progress;
     std::mutex mutex;
-    int runs = 0;
+    int runs = 0, parts_done = 0, parts = 0;
     ReferenceMotions references;
   };
   Reproduction piece() const;  // empty, of the same whole

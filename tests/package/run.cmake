@@ -29,6 +29,12 @@ file(READ ${WORK}/demo/summary.json out)
 require("\"parked\"")
 run(gzip -dc ${usr}/share/man/man1/ves.1.gz)
 require("\\.TH VES 1")
+require("SH EXAMPLES.*ves demo.*SH FILES.*ves..runs")
+foreach(file scenario.md lessons/1_six_legs.py examples README.md)
+  if(NOT EXISTS ${usr}/share/doc/ves/${file})
+    message(FATAL_ERROR "${file} is not in the package")
+  endif()
+endforeach()
 run(bash -c "source '${usr}/share/bash-completion/completions/ves' && COMP_WORDS=(ves stab) COMP_CWORD=1
   _ves
   echo $COMPREPLY")

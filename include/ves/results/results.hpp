@@ -33,7 +33,8 @@ class Progress {
   std::int64_t shown_at_ = -1;  // [ns] wall clock
   Phase phase_ = Phase::kDisarmed;
   int segment_ = -1;
-  bool open_ = false;  // a line without its end stands on the terminal
+  bool open_ = false;    // a line without its end stands on the terminal
+  bool headed_ = false;  // the columns have been named
 };
 
 }  // namespace ves

@@ -20,6 +20,6 @@ struct Chapter4 {
 /// thread at a time. Throws InputError.
 Chapter4 reproduceChapter4(const std::filesystem::path& config, const std::filesystem::path& folder,
                            int workers,
-                           const std::function<void(const std::string&, int)>& progress);
+                           const std::function<void(const std::string&, int, int, int)>& progress);
 
 }  // namespace ves
