@@ -28,6 +28,53 @@ std::vector<std::vector<std::string>> rowsOf(const std::vector<KeyDifference>& d
   return rows;
 }
 
+/// How keys of a summary end, and how a person reads what they name.
+struct Unit {
+  std::string_view ending;
+  const char* shown;
+  double times;
+};
+constexpr Unit kShown[] = {{"_m", "mm", 1e3},  {"_rad", "deg", 180.0 / M_PI},
+                           {"_s", "ms", 1e3},  {"_share", "%", 100.0},
+                           {"_j", "mJ", 1e3},  {"_n", "N", 1.0},
+                           {"_nm", "N m", 1.0}};
+
+/// A key in words with its unit, what each run has, and of two runs the second over the first.
+std::vector<std::string> rowOf(const KeyDifference& one) {
+  const auto* unit = std::find_if(std::begin(kShown), std::end(kShown),
+                                  [&](const Unit& u) { return one.key.ends_with(u.ending); });
+  std::vector<double> numbers;
+  for (const std::string& value : one.values) {
+    char* end = nullptr;
+    numbers.push_back(std::strtod(value.c_str(), &end));
+    if (value.empty() || *end != '\0') unit = std::end(kShown);
+  }
+  std::string name = one.key;
+  if (unit == std::end(kShown)) {
+    std::vector<std::string> row = {name};
+    row.insert(row.end(), one.values.begin(), one.values.end());
+    if (one.values.size() == 2) row.push_back("");
+    return row;
+  }
+  name.resize(name.size() - unit->ending.size());
+  std::replace(name.begin(), name.end(), '_', ' ');
+  std::vector<std::string> row = {fmt::format("{} [{}]", name, unit->shown)};
+  for (const double x : numbers) row.push_back(fmt::format("{:.4g}", x * unit->times));
+  if (numbers.size() == 2)
+    row.push_back(numbers[0] != 0.0 ? fmt::format("{:.3g}", numbers[1] / numbers[0]) : "");
+  return row;
+}
+
+/// What it is all about first.
+std::vector<std::vector<std::string>> resultsOf(std::vector<KeyDifference> differences) {
+  std::stable_partition(differences.begin(), differences.end(), [](const KeyDifference& one) {
+    return one.key.starts_with("emulation_") || one.key.starts_with("tool_error");
+  });
+  std::vector<std::vector<std::string>> rows;
+  for (const KeyDifference& one : differences) rows.push_back(rowOf(one));
+  return rows;
+}
+
 void print(const std::string& title, const std::vector<std::string>& header,
            const std::vector<std::vector<std::string>>& rows) {
   fmt::print("{}\n", title);
@@ -91,19 +138,22 @@ int compareCommand(int argc, char** argv) {
       summaries.push_back(summarise(one.series, resultOf(one.series), references));
     }
     const auto configuration = rowsOf(configurationDifferences(experiments)),
-               results = rowsOf(summaryDifferences(summaries));
+               results = resultsOf(summaryDifferences(summaries));
+    std::vector<std::string> beside = header;
+    if (runs.size() == 2) beside.push_back("second/first");
     print("configuration", header, configuration);
-    print("results", header, results);
+    print("results", beside, results);
     if (html.empty()) return kDone;
 
     Page page;
+    page.section("Results");
+    page.table(beside, results);
     page.section("Configuration");
     page.table(header, configuration);
-    page.section("Results");
-    page.table(header, results);
     page.section("Curves");
     const auto figure = [&](const std::string& caption, const std::vector<Panel>& panels) {
-      if (!panels.front().lines.empty()) page.figure(caption, panels);
+      if (!panels.front().lines.empty())
+        page.figure(caption, panels, "./ves compare " + fmt::format("{}", fmt::join(given, " ")));
     };
     for (int half = 0; half < 2; ++half) {
       std::vector<Panel> pose, wrench;

@@ -86,7 +86,8 @@ inline int statusOf(const RunResult& result) {
 /// has opened the page, so that nobody misses the beginning.
 class ViewBeside {
  public:
-  explicit ViewBeside(const std::string& url) : listener_(listenOn("127.0.0.1", {})), url_(url) {}
+  ViewBeside(const std::string& url, const std::filesystem::path& results)
+      : listener_(listenOn("127.0.0.1", {})), url_(url), results_(results.string()) {}
 
   /// Once the bus is entered.
   void start() {
@@ -97,7 +98,7 @@ class ViewBeside {
     process_ = std::make_unique<Process>(
         ownProgram(), std::vector<std::string>{"view", "--url", url_, "--listener",
                                                std::to_string(listener_.descriptor), "--ready",
-                                               std::to_string(ends[1])});
+                                               std::to_string(ends[1]), "--results", results_});
     unsetenv(kViewToken);
     close(listener_.descriptor);
     close(ends[1]);
@@ -119,7 +120,7 @@ class ViewBeside {
   }
 
   Listener listener_;
-  std::string url_;
+  std::string url_, results_;
   std::unique_ptr<Process> process_;
 };
 
@@ -145,7 +146,9 @@ inline int runExperiment(RunnerOptions& options) {
       return stop_requested ? Order{Request::kStop, {}, {}} : Order();
     });
   } else {
-    if (options.view) view.emplace(options.process.url);  // browsers are not on a private bus
+    if (options.view)
+      view.emplace(options.process.url,
+                   launch.scenario.parent_path());  // browsers are not on a private bus
     prepareBus(options, true);
     if (view) view->start();
     launch.process.start = true;

@@ -119,7 +119,7 @@ int servePage(const ViewOptions& options) {
                                       : listenOn(options.address, options.port);
   joinIfNamed(options.join);  // browsers are outside of it
   std::optional<LiveRun> live;
-  if (options.logs.empty()) live.emplace(options.url);
+  if (options.logs.empty()) live.emplace(options.url, options.results);
   WebServer server(listener,
                    live ? livePage() : recordedPage(options, options.rate.value_or(kEveryTick)),
                    live ? &*live : nullptr);
@@ -202,6 +202,7 @@ int viewCommand(int argc, char** argv) {
       ->capture_default_str();
   cli.add_option("--listener", options.listener)->group("");  // for ves run --view
   cli.add_option("--ready", options.ready)->group("");
+  cli.add_option("--results", options.results)->group("");
   return run(cli, argc, argv, [&] {
     const CLI::Option* files[] = {html, svg, video, png};
     const auto* file = std::find_if(std::begin(files), std::end(files),

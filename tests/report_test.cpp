@@ -175,8 +175,8 @@ TEST(Page, TakesTextAsTextAndStandsAlone) {
   Page page;
   page.section("a < b & \"c\"");
   page.claim({"1 <i>", "x", "y > 2", Verdict::kDiffers, "why & how"});
-  page.figure("it's",
-              {{"t [s]", "it's [m]", {{"o'clock", {0, 1, 2}, {0, 1, 0}, 0, false}}, false}});
+  page.figure("it's", {{"t [s]", "it's [m]", {{"o'clock", {0, 1, 2}, {0, 1, 0}, 0, false}}, false}},
+              "ves & <b>");
   page.table({"h"}, {{"<b>"}});
   const std::string html = page.html("T", "L");
   EXPECT_EQ(html.find("<i>"), std::string::npos);

@@ -24,16 +24,21 @@ matplotlib.rcParams.update({"svg.hashsalt": "ves", "svg.fonttype": "none", "font
                             "axes.spines.top": False, "axes.spines.right": False})
 
 STYLE = """<style>
-:root { color-scheme: light; }
-body { font: 17px/1.55 "DejaVu Sans", system-ui, sans-serif; color: #1b1f24; max-width: 62rem; margin: 2rem auto;
-       padding: 0 1rem; }
+:root { color-scheme: light dark; --ink: #1b1f24; --soft: #444c56; --back: #ffffff; --code: #f3f5f7; --link: #0062a8; }
+@media (prefers-color-scheme: dark) { :root { --ink: #e6edf3; --soft: #a5afb9; --back: #12161b; --code: #1b2128;
+       --link: #58a9f0; } }
+body { font: 17px/1.55 "DejaVu Sans", system-ui, sans-serif; color: var(--ink); background: var(--back);
+       max-width: 48rem; margin: 2rem auto; padding: 0 1rem; }
 h1 { font-size: 1.7rem; line-height: 1.2; } h2 { font-size: 1.2rem; margin-top: 2rem; }
 pre, code { font: 13px/1.45 "DejaVu Sans Mono", monospace; }
-pre { background: #f3f5f7; padding: .7rem .9rem; overflow-x: auto; border-radius: 4px; }
-pre.out { background: none; border-left: 3px solid #b8c4d0; border-radius: 0; color: #444c56; }
-svg { max-width: 100%; height: auto; } math { font-size: 1.1em; } math[display=block] { margin: 1rem 0; }
-details { margin: 1rem 0; } summary { cursor: pointer; color: #0067a8; }
-nav { display: flex; justify-content: space-between; margin: 2.5rem 0; font-size: .9rem; } a { color: #0067a8; }
+pre, div.sourceCode { background: var(--code); padding: .7rem .9rem; overflow-x: auto; border-radius: 4px; }
+pre.sourceCode { padding: 0; }
+pre.out { background: none; border-left: 3px solid #8b98a5; border-radius: 0; color: var(--soft); }
+svg { max-width: 100%; height: auto; background: #ffffff; border-radius: 4px; }
+math { font-size: 1.1em; } math[display=block] { margin: 1rem 0; }
+details { margin: 1rem 0; } summary { cursor: pointer; color: var(--link); }
+nav { display: flex; justify-content: space-between; margin: 2.5rem 0; font-size: .9rem; } a { color: var(--link); }
+@media (prefers-color-scheme: dark) { code span { filter: brightness(1.7); } }
 </style>"""
 
 
@@ -85,19 +90,34 @@ def render(lesson, others, folder):
     at = others.index(lesson)
     link = lambda i, word: (f'<a href="{others[i].stem}.html">{word}</a>'
                             if 0 <= i < len(others) else "<span></span>")
-    page = markdown(lesson) + f"\n\n<nav>{link(at - 1, 'the lesson before')}{link(at + 1, 'the next one')}</nav>\n"
-    title = next(line[2:] for line in page.splitlines() if line.startswith("# "))
+    page = (markdown(lesson) + f"\n\n<nav>{link(at - 1, 'the lesson before')}"
+            f"<a href=\"index.html\">all of them</a>{link(at + 1, 'the next one')}</nav>\n")
+    title = title_of(lesson)
+    file = folder / f"{lesson.stem}.html"
+    file.write_text(html(page, title, folder))
+    return file
+
+
+def title_of(lesson):
+    return re.search(r"^# # (.*)", lesson.read_text(), flags=re.M).group(1)
+
+
+def html(page, title, folder):
     style = folder / "style.html"
     style.write_text(STYLE)
-    made = subprocess.run(["pandoc", "--from=markdown+raw_attribute+tex_math_dollars", "--to=html5", "--standalone", "--mathml",
-                                  "--highlight-style=pygments", f"--metadata=pagetitle:{title}",
+    made = subprocess.run(["pandoc", "--from=markdown+raw_attribute+tex_math_dollars", "--to=html5", "--standalone",
+                           "--mathml", "--highlight-style=pygments", f"--metadata=pagetitle:{title}",
                            f"--include-in-header={style}"],
                           input=page, text=True, check=True, capture_output=True)
     style.unlink()
-    file = folder / f"{lesson.stem}.html"
     # Browsers set a combining accent beside its letter, and the accent alone above it.
-    file.write_text(made.stdout.replace("\u0308", "\u00a8").replace("\u0307", "\u02d9"))
-    return file
+    return made.stdout.replace("\u0308", "\u00a8").replace("\u0307", "\u02d9")
+
+
+def index(lessons, folder):
+    page = "# VES, in lessons\n\n" + "".join(f"* [{title_of(l)}]({l.stem}.html)\n" for l in lessons)
+    (folder / "index.html").write_text(html(page, "VES, in lessons", folder))
+    return folder / "index.html"
 
 
 def main():
@@ -117,6 +137,8 @@ def main():
             markdown(lesson)
         else:
             print(render(lesson, every if lesson in every else [lesson], given.out))
+    if not given.check and not given.lessons:
+        print(index(every, given.out))
 
 
 main()

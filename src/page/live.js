@@ -101,7 +101,11 @@ class Live {
     if (factors.some(f => Math.abs(f - 1) > 1e-9)) out.push(`vehicle's mass, damping, stiffness × ${factors.map(f => +f.toPrecision(3)).join(', ')}`);
     if (this.stands) out.push('time stands');
     if (this.drag && this.drag.force) out.push(`push of ${this.drag.force.length().toFixed(0)} N for ${element('seconds').value} s on release`);
-    if (this.closed) out.push('the run is over, or its viewer: this is what was seen; all of it: ./ves view');
+    if (this.closed) {
+      const folder = first.scene.results;
+      out.push('the run is over, or its viewer has ended; this is what was seen');
+      if (folder) out.push(`all of it: ./ves view ${folder}`);
+    }
     return out;
   }
 

@@ -29,7 +29,8 @@ std::vector<TimedAction> allPushes(const Experiment& e, const std::vector<TimedA
 
 }  // namespace
 
-LiveRun::LiveRun(const std::string& url) : bus_(url) {
+LiveRun::LiveRun(const std::string& url, const std::string& results)
+    : bus_(url), results_(results) {
   bus_.subscribe({channel::kSample, channel::kState, channel::kTruth, channel::kTiming,
                   channel::kExperiment, channel::kSetup},
                  [this](const std::string& channel, const void* data, std::uint32_t size) {
@@ -129,6 +130,7 @@ void LiveRun::describe() {
   nlohmann::ordered_json text;
   text["edition"] = edition_;
   text["scene"] = scene_->description();
+  text["scene"]["results"] = results_;
   auto& scalars = text["scene"]["scalars"];
   for (const char* name :
        {"stop_asked", "stop_refusal", "vehicle_asked", "vehicle_refusal", "pace", "lockstep"})

@@ -84,8 +84,8 @@ std::string svg(const std::vector<Panel>& panels) {
       const std::string block = fmt::format("$p{}_{}", p, i);
       script += fmt::format("{} << EOD\n{}EOD\n", block, data(line));
       plot += fmt::format("{}{} using 1:2 with lines lw {} dt {} lc rgb '{}' {}",
-                          plot.empty() ? "plot " : ", ", block, line.dashed ? 1.3 : 1.8,
-                          line.dashed ? 2 : 1, kColour[line.colour],
+                          plot.empty() ? "plot " : ", ", block, line.dashed ? 1.6 : 1.8,
+                          line.dashed ? "(9,5)" : "1", kColour[line.colour],
                           line.name.empty() ? "notitle" : "title " + quoted(line.name));
     }
     script += plot + "\n";
@@ -103,6 +103,8 @@ std::string svg(const std::vector<Panel>& panels) {
   if (out.find("</svg>") == std::string::npos) return kNoFigure;
 
   out.erase(0, out.find("<svg"));
+  // One panel is no wider than one of two, so that letters are of one size.
+  out.insert(4, fmt::format(" style=\"max-width: {}px\"", columns == 1 ? 520 : 960));
   out = std::regex_replace(out, std::regex("<title>[^<]*</title>\\s*|<desc>[^<]*</desc>\\s*"), "");
   out.erase(out.find("<defs>"), out.find("</defs>") + 7 - out.find("<defs>"));
   out = std::regex_replace(

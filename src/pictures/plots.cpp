@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <iterator>
 #include <map>
@@ -23,7 +24,7 @@ namespace {
 constexpr double kShownLength = 1e3;  // [mm/m]
 
 struct Span {
-  double from, to;  // [s]
+  double from, to;
 };
 
 struct Curve {
@@ -47,14 +48,35 @@ class Page {
         "set multiplot layout {},{} title {} font 'DejaVu Sans,13' margins 0.06,0.985,{},0.90 "
         "spacing 0.06,0.09\n"
         "set grid lc rgb '#cccccc' lw 1 dt 1\nset border 3 lc rgb '#555555'\nset tics nomirror\n"
-        "set key top right horizontal samplen 2 width 3 font 'DejaVu Sans,11'\nset xrange [{}:{}]\n"
-        "set offsets graph 0,0,0.18,0.05\n",
+        "set key at graph 1.0,1.02 right bottom horizontal maxrows 1 samplen 2 width 1 font "
+        "'DejaVu Sans,10'\nset xrange [{}:{}]\nset offsets graph 0,0,0.05,0.05\n",
         rows == 1 ? 480 : 800, quoted(file), rows, cols, quoted(title), rows == 1 ? 0.14 : 0.085,
         span.from, span.to);
     script_ += markLines(marks, span.from, span.to);
   }
 
-  void panel(const std::string& ylabel, const std::vector<Curve>& curves) {
+  /// [units of the panel] the least and the largest value.
+  Span range(const std::vector<Curve>& curves) const {
+    double low = HUGE_VAL, high = -HUGE_VAL;
+    for (const Row& row : series_.rows) {
+      if (row.t < span_.from || row.t > span_.to) continue;
+      for (const Curve& curve : curves) {
+        const double y = curve.value(row);
+        if (!std::isfinite(y)) continue;
+        low = std::min(low, y);
+        high = std::max(high, y);
+      }
+    }
+    return low <= high ? Span{low, high} : Span{0.0, 0.0};
+  }
+
+  /// `least`: so far its axis goes at least, so that what rests is seen to rest.
+  void panel(const std::string& ylabel, const std::vector<Curve>& curves, double least = 0.0) {
+    const Span values = range(curves);
+    const double middle = 0.5 * (values.from + values.to);
+    script_ += values.to - values.from < least
+                   ? fmt::format("set yrange [{}:{}]\n", middle - 0.5 * least, middle + 0.5 * least)
+                   : "set autoscale y\n";
     const bool bottom = ++drawn_ > panels_ - cols_;
     constexpr std::size_t kMostDrawn = 1400;  // [-] two for a pixel of the widest panel
     for (std::size_t i = 0; i < curves.size(); ++i) {
@@ -72,9 +94,10 @@ class Page {
     script_ += fmt::format("set ylabel {} offset 1\nset xlabel {}\nplot ", quoted(ylabel),
                            quoted(bottom ? "time since the first tick [s]" : ""));
     for (std::size_t i = 0; i < curves.size(); ++i)
-      script_ += fmt::format("{}$curve{} with lines lw {} dt {} lc rgb '{}' title {}",
-                             i ? ", " : "", i, curves[i].dashed ? 1.5 : 2.0,
-                             curves[i].dashed ? 2 : 1, curves[i].colour, quoted(curves[i].title));
+      script_ +=
+          fmt::format("{}$curve{} with lines lw {} dt {} lc rgb '{}' title {}", i ? ", " : "", i,
+                      curves[i].dashed ? 1.5 : 2.0, curves[i].dashed ? "(9,5)" : "1",
+                      curves[i].colour, quoted(curves[i].title));
     script_ += "\n";
   }
 
@@ -201,17 +224,25 @@ std::vector<std::filesystem::path> drawPlots(const Series& series,
             program, 2, 3);
   const std::vector<Column> free =
       emulation ? columnsOf(series, *emulation) : std::vector<Column>();
-  for (int i = 0; i < 6; ++i) {
-    const double scale = coordinate(i).shown;
-    std::vector<Curve> curves = {
-        {scaled(name(i, "actual"), scale), "actual", kColour[0], false},
-        {scaled(name(i, "desired"), scale), "commanded", kColour[1], true}};
-    if (emulation)
-      curves.push_back({[value = free[static_cast<std::size_t>(i)].value, scale](const Row& row) {
-                          return value(row) * scale;
-                        },
-                        "base in free space", kColour[2], true});
-    pose.panel(fmt::format("{} [{}]", coordinate(i).name, coordinate(i).shown_unit), curves);
+  constexpr double kLeast = 0.1;  // [-] of the panel beside it that goes farthest
+  constexpr double kSeen = 0.1;   // [mm, deg]
+  for (int half = 0; half < 2; ++half) {
+    std::vector<std::vector<Curve>> panels;
+    double most = 0.0;
+    for (int i = 3 * half; i < 3 * half + 3; ++i) {
+      const double scale = coordinate(i).shown;
+      panels.push_back({{scaled(name(i, "actual"), scale), "actual", kColour[0], false},
+                        {scaled(name(i, "desired"), scale), "commanded", kColour[1], true}});
+      if (emulation)
+        panels.back().push_back({[value = free[static_cast<std::size_t>(i)].value,
+                                  scale](const Row& row) { return value(row) * scale; },
+                                 "base in free space", kColour[2], true});
+      const Span y = pose.range(panels.back());
+      most = std::max(most, y.to - y.from);
+    }
+    for (int i = 3 * half; i < 3 * half + 3; ++i)
+      pose.panel(fmt::format("{} [{}]", coordinate(i).name, coordinate(i).shown_unit),
+                 panels[static_cast<std::size_t>(i - 3 * half)], std::max(kLeast * most, kSeen));
   }
   finish("pose.png", pose);
 

@@ -165,7 +165,8 @@ void onTheArm(Reproduction& r) {
   r.page.table({"", "moves [mm]", "as published", "feed-forward", "all", "all, no noise",
                 "six modes, published, no noise", "six modes, all, no noise"},
                rows);
-  r.page.figure("Deploy, DOSS: distance of the platform from the moving base.", {distances});
+  r.page.figure("Deploy, DOSS: distance of the platform from the moving base.", {distances},
+                "./ves run srms_deploy_doss --lockstep");
   r.page.text("Damping that the emulation adds to the two lowest modes, let go one by one:");
   r.page.table({"", "[Hz]", "zeta", "added, all", "[Hz]", "zeta", "added, all"}, damping);
 }

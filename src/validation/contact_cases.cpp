@@ -104,7 +104,8 @@ void contactSection(Reproduction& r) {
   r.page.table({"", "free space: contacts", "peak [N]", "e", "published: contacts", "peak [N]", "e",
                 "put in [mJ]", "compensated: contacts", "peak [N]", "e", "put in [mJ]"},
                rows);
-  r.page.figure("A ball of 100 kg meets the tool of the PUMA.", {forces});
+  r.page.figure("A ball of 100 kg meets the tool of the PUMA.", {forces},
+                "./ves run contact_rebound_puma --lockstep --force");
 }
 
 }  // namespace ves

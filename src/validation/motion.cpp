@@ -6,6 +6,13 @@
 namespace ves {
 namespace {
 
+/// Commanded minus actual, as it is shown.
+auto error(int i) {
+  return [i](const Row& row) {
+    return (row.state.x_desired[i] - row.truth.x[i]) * coordinate(i).shown;
+  };
+}
+
 void trajectories(Reproduction& r) {
   r.page.section("4.2.1 Trajectory control");
   const Reproduction::Run z = r.run("z_sine");
@@ -26,16 +33,12 @@ void trajectories(Reproduction& r) {
   r.claim("z_hardware",
           {{"extending_mm", extending * kMilli}, {"retracting_mm", retracting * kMilli}});
   auto panels = tracking(z.series, SegmentKind::kTrajectory, {2});
-  const auto error = [](int i) {
-    return [i](const Row& row) {
-      return (row.state.x_desired[i] - row.truth.x[i]) * coordinate(i).shown;
-    };
-  };
   panels.push_back({kSinceSegment,
                     "z error [mm]",
                     {lineOf("", z.series, SegmentKind::kTrajectory, 0, error(2))},
                     false});
-  r.page.figure("Figures 4.4 and 4.5: z, and commanded minus actual.", panels);
+  r.page.figure("Figures 4.4 and 4.5: z, and commanded minus actual.", panels,
+                "./ves run z_sine --lockstep");
 
   const Reproduction::Run alpha = r.run("alpha_sine");
   const double most = summarise(alpha.series, alpha.result)["alpha_error_max_rad"].get<double>();
@@ -47,7 +50,8 @@ void trajectories(Reproduction& r) {
                     "alpha error [deg]",
                     {lineOf("", alpha.series, SegmentKind::kTrajectory, 0, error(3))},
                     false});
-  r.page.figure("Figures 4.6 and 4.7: alpha, and commanded minus actual.", panels);
+  r.page.figure("Figures 4.6 and 4.7: alpha, and commanded minus actual.", panels,
+                "./ves run alpha_sine --lockstep");
 }
 
 void freeDecay(Reproduction& r) {
@@ -62,8 +66,19 @@ void freeDecay(Reproduction& r) {
     largest[fmt::format("{}_{}", c.name, c.shown_unit)] = error * c.shown;
   }
   r.claim("free_decay", largest);
-  r.page.figure("Figures 4.8 to 4.10: commanded and actual pose.",
-                tracking(run.series, SegmentKind::kAdmittance, {0, 1, 2, 3, 4, 5}));
+  const char* const command = "./ves run free_decay --lockstep";
+  r.page.figure("Figure 4.8: commanded and actual pose.",
+                tracking(run.series, SegmentKind::kAdmittance, {0, 1, 2, 3, 4, 5}), command);
+  std::vector<Panel> errors;
+  for (const int first : {0, 3}) {
+    Panel panel{kSinceSegment, first == 0 ? "error [mm]" : "error [deg]", {}, false};
+    for (int k = 0; k < 3; ++k)
+      panel.lines.push_back(lineOf(std::string(coordinate(first + k).name), run.series,
+                                   SegmentKind::kAdmittance, k, error(first + k)));
+    errors.push_back(panel);
+  }
+  r.page.figure("Figures 4.9 and 4.10: commanded minus actual position and attitude.", errors,
+                command);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <utility>
 
 namespace ves {
@@ -29,7 +30,7 @@ table.numbers { font-size: .78rem; } table.numbers td { white-space: nowrap; }
 table.numbers td:not(:first-child), table.numbers th:not(:first-child) { text-align: right; padding: .3rem 0 .3rem .7rem; }
 figure { margin: 1rem 0; } figure svg { width: 100%; height: auto; display: block; }
 .drawings { display: flex; gap: 1rem; } .drawings div { flex: 1; } .drawings svg { max-height: 22rem; }
-figcaption { font-size: .85rem; color: var(--soft); }
+figcaption { font-size: .85rem; color: var(--soft); } figcaption code { display: block; font-size: .8rem; overflow-wrap: anywhere; }
 .claim { border-left: 3px solid var(--line); padding: .1rem 0 .1rem .9rem; margin: .8rem 0; font-size: .92rem; }
 .claim p { margin: .25rem 0; } .claim .says { color: var(--soft); }
 .verdict { font-weight: 600; white-space: nowrap; } .agrees { color: var(--agrees); }
@@ -37,6 +38,10 @@ figcaption { font-size: .85rem; color: var(--soft); }
 svg .ink { stroke: var(--ink); } svg .ink-text { fill: var(--ink); } svg .mark { stroke: var(--soft); }
 svg .mark-text { fill: var(--soft); } svg .gridline { stroke: var(--line); }
 svg .c0 { stroke: var(--c0); } svg .c1 { stroke: var(--c1); } svg .c2 { stroke: var(--c2); }
+@media (max-width: 44rem) { table:not(.numbers), table:not(.numbers) tbody, table:not(.numbers) tr,
+  table:not(.numbers) td { display: block; } table:not(.numbers) thead { display: none; }
+  table:not(.numbers) td { border: 0; padding: .1rem 0; } table:not(.numbers) tr { border-bottom: 1px solid var(--line);
+  padding: .4rem 0; } .verdict { white-space: normal; } }
 @media print { :root { --ink: #000; --back: #fff; --line: #bbb; --c0: #0067a8; --c1: #c14e00; --c2: #00805e; }
   body { margin: 0; max-width: none; font-size: 10pt; } figure, .claim, tr { break-inside: avoid; }
   h2 { break-after: avoid; } }
@@ -52,6 +57,13 @@ std::string escaped(const std::string& text) {
       default: out += c;
     }
   return out;
+}
+
+/// "Figures 4.4 and 4.5" as it stands in an address.
+std::string anchor(std::string name) {
+  for (char& c : name)
+    if (!std::isalnum(static_cast<unsigned char>(c)) && c != '.') c = '-';
+  return name;
 }
 
 std::string badge(Verdict verdict) {
@@ -81,6 +93,7 @@ void Page::append(const Page& other) {
   const Section& first = other.sections_.front();
   last().body += first.body;
   last().claims.insert(last().claims.end(), first.claims.begin(), first.claims.end());
+  last().figures.insert(last().figures.end(), first.figures.begin(), first.figures.end());
   sections_.insert(sections_.end(), other.sections_.begin() + 1, other.sections_.end());
 }
 
@@ -98,9 +111,13 @@ void Page::drawings(const std::string& caption, const std::vector<std::string>& 
                   all, escaped(caption));
 }
 
-void Page::figure(const std::string& caption, const std::vector<Panel>& panels) {
-  last().body += fmt::format("<figure>\n{}<figcaption>{}</figcaption></figure>\n", svg(panels),
-                             escaped(caption));
+void Page::figure(const std::string& caption, const std::vector<Panel>& panels,
+                  const std::string& command) {
+  const std::string name = caption.substr(0, caption.find(':'));
+  if (name.starts_with("Figure")) last().figures.push_back(name);
+  last().body +=
+      fmt::format("<figure id=\"{}\">\n{}<figcaption>{}<code>{}</code></figcaption></figure>\n",
+                  anchor(name), svg(panels), escaped(caption), escaped(command));
 }
 
 void Page::table(const std::vector<std::string>& header,
@@ -125,7 +142,12 @@ std::string Page::html(const std::string& title, const std::string& lead) const 
         std::count_if(all.begin(), all.end(), [v](const Claim& c) { return c.verdict == v; });
     if (n) counts += fmt::format("{}{} {}", counts.empty() ? "" : ", ", n, badge(v));
   }
-  std::string rows, body = sections_.front().body;
+  std::string rows, index, body = sections_.front().body;
+  for (const Section& section : sections_)
+    for (const std::string& name : section.figures)
+      index += fmt::format("{}<a href=\"#{}\">{}</a>", index.empty() ? "" : " | ", anchor(name),
+                           escaped(name));
+  if (!index.empty()) index = "<p>" + index + "</p>\n";
   for (std::size_t i = 1; i < sections_.size(); ++i) {
     body += fmt::format("<h2 id=\"s{}\">{}</h2>\n{}", i, escaped(sections_[i].title),
                         sections_[i].body);
@@ -145,8 +167,8 @@ std::string Page::html(const std::string& title, const std::string& lead) const 
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
       "<title>{0}</title>\n<style>{1}</style></head>\n<body>\n<h1>{0}</h1>\n<p>{2}</p>\n"
-      "{3}{4}</body></html>\n",
-      escaped(title), kStyle, escaped(lead), claims_table, body);
+      "{3}{4}{5}</body></html>\n",
+      escaped(title), kStyle, escaped(lead), index, claims_table, body);
 }
 
 }  // namespace ves

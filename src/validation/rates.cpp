@@ -68,7 +68,7 @@ void bandwidth(Reproduction& r) {
   r.page.figure(
       "One leg with its LegSlave under a sine of +-10 mm, with the gain of either "
       "direction in both.",
-      panels);
+      panels, "./ves report");
 }
 
 }  // namespace

@@ -138,10 +138,10 @@ Chapter4 reproduceChapter4(const fs::path& config, const fs::path& folder, int w
   Chapter4 out;
   out.html = r.page.html(
       "Vehicle Emulation System: chapter 4 once more",
-      fmt::format("The simulation results of NASA-CR-195076, rebuilt with version {} of this "
-                  "replica in lockstep. Numbers that the report leaves out are substitutes (up to "
-                  "{} in a run); where one decides, nothing is claimed.",
-                  build().version, r.substitutes));
+      fmt::format("The simulation results of NASA-CR-195076, rebuilt in lockstep by this replica "
+                  "({}). Numbers that the report leaves out are substitutes (up to {} in a run); "
+                  "where one decides, nothing is claimed.",
+                  describeBuild(), r.substitutes));
   for (const Claim& c : r.page.claims())
     out.summary["claims"].push_back({{"where", c.where},
                                      {"claim", c.says},

@@ -59,7 +59,7 @@ void drift(Reproduction& r) {
            {"fz_4h_n", summary["fz_drift_after_4h_max_n"].get<double>()}});
   r.page.figure(
       "Figures 4.2 and 4.3: mean of each sample of the unloaded sensor, and the laboratory.",
-      panels);
+      panels, "./ves run sensor_drift --lockstep");
 }
 
 }  // namespace
@@ -82,7 +82,8 @@ void sensorSection(Reproduction& r) {
                            {"fy_n", peak(1)},
                            {"fz_n", peak(2)},
                            {"moment_nm", peak.tail<3>().maxCoeff()}});
-  r.page.figure("Figure 4.1: the unloaded sensor for one second at 100 Hz.", panels);
+  r.page.figure("Figure 4.1: the unloaded sensor for one second at 100 Hz.", panels,
+                "./ves run sensor_noise --lockstep");
 
   calibration(r);
   drift(r);

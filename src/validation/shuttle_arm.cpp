@@ -147,7 +147,9 @@ void onTheMachine(Reproduction& r, const std::string& configuration, const std::
                   "what the VES commands with Filters 1 to 3; sensor noise off above, on below.",
                   figure, figure + 1, title(configuration, robot),
                   n["modes_kept"].get<std::int64_t>()),
-      panels);
+      panels,
+      fmt::format("./ves run {} --lockstep --set legs.filters=outputs --set gravity_m_per_s2=0",
+                  scenario));
 }
 
 /// Lets go every mode of base and robot from a centimetre and a half, the robot at rest.

@@ -62,7 +62,7 @@ void sampledFeedback(Reproduction& r) {
   r.page.figure(
       "Figure E.4: (a) the pair, (b) the third root, zeta = 0.5, f/F from 10 (orange) to 100 "
       "(green) in steps of 10.",
-      panels);
+      panels, "./ves stability map");
   r.page.table(
       {"f/F", "pair at 0.5", "third at 0.5", "pair at 1", "third at 1", "largest stable m1/m"},
       rows);

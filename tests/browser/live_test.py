@@ -137,6 +137,11 @@ class Live(support.Page):
         self.until("ves.words.includes('stop requested from a browser, and taken')")
         self.shot("stopped")
         self.assertEqual(run.wait(), 0, run.said)
+        # At the end it says where the rest is, and has no buttons that do nothing.
+        self.until("ves.words.includes('the run is over')")
+        self.assertIn(str(run.out), self.ask("ves.words"))
+        for name in ("stop", "touch"):
+            self.assertTrue(self.ask("document.getElementById(arguments[0]).hidden", name))
         summary = run.summary()
         self.assertRegex(summary["ended_early"], r"a stop was requested at \d")
         self.assertLess(summary["simulated_s"], 15.0)

@@ -4,9 +4,9 @@
 
   tests/tools/compensation.py
 
-Runs `./ves run --lockstep` for every cell and prints rms over peak [%]: the platform's distance from
-the robot on its base in free space, over the base's largest displacement. The gate does not keep
-anything from running. An identification of the servos is made first.
+Runs `./ves run --lockstep` for every cell and prints the emulation error in position / rotation, rms
+[%] of the base's amplitude from rest. The gate does not keep anything from running. An identification
+of the servos is made first.
 """
 import concurrent.futures
 import json
@@ -38,10 +38,10 @@ def run(folder, scenario, sets, servo=None, name="run"):
     if ended.returncode:
         return ended.stderr.strip().splitlines()[-1] if ended.stderr else "stopped"
     found = json.loads((out / "summary.json").read_text())
-    if "emulation_error_rms_m" not in found:
+    if "emulation_error_position_share" not in found:
         return "-"
-    percent = 100 * found["emulation_error_rms_m"] / found["emulation_travel_m"]
-    return f"{percent:.{2 if percent < 1 else 1 if percent < 10 else 0}f}"
+    shares = [100 * found[f"emulation_error_{what}_share"] for what in ("position", "attitude")]
+    return " / ".join(f"{s:.{2 if s < 1 else 1 if s < 10 else 0}f}" for s in shares)
 
 
 def mismatch(text):

@@ -20,8 +20,9 @@ namespace ves {
 
 class LiveRun : public LiveSource {
  public:
-  /// Throws InputError when the bus cannot be opened.
-  explicit LiveRun(const std::string& url);
+  /// `results`: where the run leaves them, for the page to say; empty: nobody knows. Throws
+  /// InputError when the bus cannot be opened.
+  explicit LiveRun(const std::string& url, const std::string& results = "");
 
   int descriptor() noexcept { return bus_.descriptor(); }
   /// Takes in what has arrived; true when there is something new to show.
@@ -48,6 +49,7 @@ class LiveRun : public LiveSource {
   void remind();
 
   Bus bus_;
+  std::string results_;
   Identity self_ = Identity::draw();
   std::int64_t sent_ = 0;  // [-] messages
 

@@ -19,7 +19,10 @@ class Page {
   void text(const std::string& paragraph);
   /// Adds the claim here, and to the table on top.
   void claim(const Claim& claim);
-  void figure(const std::string& caption, const std::vector<Panel>& panels);
+  /// `command` prints or draws the same. One of the report's ("Figure 4.1: ...") is in the index on
+  /// top.
+  void figure(const std::string& caption, const std::vector<Panel>& panels,
+              const std::string& command);
   /// Drawings beside each other, as SVG.
   void drawings(const std::string& caption, const std::vector<std::string>& svgs);
   void table(const std::vector<std::string>& header,
@@ -35,6 +38,7 @@ class Page {
   struct Section {
     std::string title, body;
     std::vector<Claim> claims;
+    std::vector<std::string> figures = {};  // names, each an anchor
   };
   Section& last() { return sections_.back(); }
 
