@@ -8,6 +8,7 @@
 #include "ves/page/page.hpp"
 #include "ves/page/scene.hpp"
 #include "ves/page/still.hpp"
+#include "ves/realtime/realtime.hpp"
 #include "ves/series/series.hpp"
 
 namespace ves::app {
@@ -136,7 +137,14 @@ int servePage(const ViewOptions& options) {
   }
   if (live) server.watch(live->descriptor(), [] {});
   int ready = options.ready;
-  while (!stop_requested) {
+  constexpr std::int64_t kTail = 5'000'000'000;  // [ns] for a slow page to see the end
+  std::int64_t asked = 0;
+  const auto goesOn = [&] {
+    if (!stop_requested) return true;
+    if (asked == 0) asked = monotonicNow();
+    return live && !server.shownAll() && monotonicNow() - asked < kTail;
+  };
+  while (goesOn()) {
     server.serve(50);
     if (ready >= 0 && server.pages() > 0) {  // who waits for it may begin
       if (::write(ready, "1", 1) < 0) fmt::print(stderr, "ves view: nobody waits\n");

@@ -92,6 +92,10 @@ TEST_F(Programs, HelpAndProgressFitATerminal) {
       test::sh(app("run") + "puma_tilt --lockstep --no-plots" + out("a") + " 2>&1 >/dev/null");
   EXPECT_LE(widest(o.text), 80u) << o.text;
   EXPECT_NE(o.text.find("calibration"), std::string::npos) << o.text;
+  const Output results = run("puma_on_table_4_1 --lockstep" + out("b"));
+  std::istringstream lines(results.text);
+  for (std::string line; std::getline(lines, line);)
+    EXPECT_TRUE(line.size() <= 80 || line.find(folder_.string()) != std::string::npos) << line;
 }
 
 TEST_F(Programs, ARunThatIsThereIsKept) {

@@ -38,7 +38,7 @@ svg { max-width: 100%; height: auto; background: #ffffff; border-radius: 4px; }
 math { font-size: 1.1em; } math[display=block] { margin: 1rem 0; }
 details { margin: 1rem 0; } summary { cursor: pointer; color: var(--link); }
 nav { display: flex; justify-content: space-between; margin: 2.5rem 0; font-size: .9rem; } a { color: var(--link); }
-@media (prefers-color-scheme: dark) { code span { filter: brightness(1.7); } }
+@media (prefers-color-scheme: dark) { code span span { filter: invert(1) hue-rotate(180deg); } }
 </style>"""
 
 

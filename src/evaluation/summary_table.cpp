@@ -14,10 +14,10 @@ std::string table(const nlohmann::ordered_json& s) {
     return s.contains(key) ? s[key].get<double>() : NAN;
   };
   std::string out = fmt::format("{}\n\n", s["description"].get<std::string>());
-  out += fmt::format(
-      "  ended {} after {:.2f} s ({} ticks), {:.4g} x real time, {} substitute values\n",
-      s["ended"].get<std::string>(), number("simulated_s"), s["ticks"].get<std::int64_t>(),
-      number("real_time_factor"), s["substitute_values"].get<int>());
+  out += fmt::format("  ended {} after {:.2f} s ({} ticks), {:.4g} x real time, {} substitutes\n",
+                     s["ended"].get<std::string>(), number("simulated_s"),
+                     s["ticks"].get<std::int64_t>(), number("real_time_factor"),
+                     s["substitute_values"].get<int>());
   if (const std::string why = s.value("ended_early", ""); !why.empty())
     out += fmt::format("  ended early: {}\n", why);
   if (s["messages_lost"].get<std::int64_t>() > 0)
@@ -49,10 +49,9 @@ std::string table(const nlohmann::ordered_json& s) {
       return s.contains(key) ? fmt::format(" ({:.3g} %)", 100.0 * number(key)) : "";
     };
     out += fmt::format(
-        "  emulation off by {:.3f} mm{} and {:.4f} deg{} rms, at most {:.3f} mm and {:.4f} deg:\n"
-        "           beside the robot on its base in free space, which goes {:.3f} mm and {:.4f} "
-        "deg "
-        "from rest\n",
+        "  emulation off by {:.3f} mm{} and {:.4f} deg{} rms,\n"
+        "           at most {:.3f} mm and {:.4f} deg: beside the robot on its base in\n"
+        "           free space, which goes {:.3f} mm and {:.4f} deg from rest\n",
         number("emulation_error_rms_m") * 1e3, share("emulation_error_position_share"),
         number("emulation_error_rms_rad") / kDegree, share("emulation_error_attitude_share"),
         number("emulation_error_max_m") * 1e3, number("emulation_error_max_rad") / kDegree,

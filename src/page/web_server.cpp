@@ -190,6 +190,13 @@ class WebServer::Impl {
       if (wants(page)) lws_callback_on_writable(wsi);
   }
 
+  bool shownAll() const {
+    return std::all_of(pages_.begin(), pages_.end(), [&](const auto& one) {
+      const Page& page = one.second;
+      return page.drawn && page.edition == live_->edition() && page.picture == live_->newest();
+    });
+  }
+
   void adopt(int descriptor) {
     if (connections_ >= kMostConnections) {
       ++refusals_.full;
@@ -411,6 +418,7 @@ void WebServer::watch(int descriptor, std::function<void()> readable) {
 }
 void WebServer::serve(int milliseconds) { impl_->serve(milliseconds); }
 void WebServer::show() { impl_->show(); }
+bool WebServer::shownAll() const { return impl_->shownAll(); }
 void WebServer::adopt(int descriptor) { impl_->adopt(descriptor); }
 
 }  // namespace ves

@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <cstring>
 
+#include "ves/core/lines.hpp"
 #include "ves/evaluation/contact_pairs.hpp"
 #include "ves/evaluation/summary.hpp"
 #include "ves/evaluation/tool_motion.hpp"
@@ -71,7 +72,9 @@ std::string writeResults(const std::filesystem::path& folder, const RunResult& r
   const std::filesystem::path here = folder.lexically_relative(std::filesystem::current_path());
   const bool below = !here.empty() && *here.begin() != "..";
   const std::string shown = (below ? here : folder).string();
-  return out + fmt::format("  {}\n    {}\n  see it: ./ves view {}\n", shown, files, shown);
+  constexpr std::size_t kColumns = 80, kBehindNames = 11;
+  return folded(out + fmt::format("  {}\n    {}\n", shown, files), kColumns, kBehindNames) +
+         fmt::format("  see it: ./ves view {}\n", shown);
 }
 
 void Progress::show(Phase phase, int segment, std::int64_t tick, const double (&x)[6]) {

@@ -86,6 +86,8 @@ class WebServer {
 
   /// Calls `readable` when the descriptor can be read.
   void watch(int descriptor, std::function<void()> readable);
+  /// Whether every page that watches has drawn all there is.
+  bool shownAll() const;
   /// Waits for something to do, at most so long, and does it.
   void serve(int milliseconds);
   /// Sends what is new to every page that has drawn what it got.
