@@ -23,6 +23,7 @@
 #include "help.hpp"
 #include "ves/analysis/leaning.hpp"
 #include "ves/config/experiment.hpp"
+#include "ves/core/spelling.hpp"
 #include "ves/run/run.hpp"
 #include "ves/series/series.hpp"
 
@@ -271,6 +272,20 @@ inline std::string shortened(std::string text) {
   return text.substr(0, kHead) + " ... " + text.substr(text.size() - kTail);
 }
 
+/// What an unknown option was meant to be; empty where nothing is near.
+inline std::string optionMeant(const CLI::App& cli, const std::string& said) {
+  const std::size_t at = said.find("--");
+  if (at == std::string::npos) return "";
+  const std::string given = said.substr(at, said.find_first_of(" =", at) - at);
+  std::vector<std::string> names;
+  for (const CLI::App* one = &cli; one;
+       one = one->get_subcommands().empty() ? nullptr : one->get_subcommands().front())
+    for (const CLI::Option* option : one->get_options())
+      for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+  const std::string meant = nearest(given, names);
+  return meant.empty() ? "" : fmt::format(", did you mean {}?", meant);
+}
+
 /// Parses, runs, and turns bad input into one line and status 2.
 inline int run(CLI::App& cli, int argc, char** argv, const std::function<int()>& body) {
   cli.formatter(std::make_shared<EightyColumns>());
@@ -283,7 +298,9 @@ inline int run(CLI::App& cli, int argc, char** argv, const std::function<int()>&
     cli.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return cli.exit(error);  // --help
-    fmt::print(stderr, "{}: {} (see --help)\n", cli.get_name(), shortened(error.what()));
+    const bool unknown = dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr;
+    fmt::print(stderr, "{}: {}{} (see --help)\n", cli.get_name(), shortened(error.what()),
+               unknown ? optionMeant(cli, error.what()) : "");
     return kBadInput;
   }
   try {

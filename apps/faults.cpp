@@ -61,6 +61,18 @@ Sets compensationOf(const std::string& name) {
 
 }  // namespace
 
+namespace {
+
+/// Which row was meant, as far as its name tells.
+std::string rowMeant(const std::string& id, const std::vector<FaultRow>& rows) {
+  std::vector<std::string> ids;
+  for (const FaultRow& row : rows) ids.push_back(row.id);
+  const std::string meant = nearest(id, ids);
+  return meant.empty() ? "want one that --list names" : fmt::format("did you mean '{}'?", meant);
+}
+
+}  // namespace
+
 int faultsCommand(int argc, char** argv) {
   CLI::App cli(
       "Injects every fault of the table, most in lockstep, some into real processes, and says "
@@ -118,7 +130,7 @@ int faultsCommand(int argc, char** argv) {
     const bool own = scenario.empty() && bench.sets.empty();
     for (const std::string& id : only)
       if (std::none_of(rows.begin(), rows.end(), [&](const FaultRow& r) { return id == r.id; }))
-        throw InputError(fmt::format("'{}': no such row, want one that --list names", id));
+        throw InputError(fmt::format("'{}': no such row, {}", id, rowMeant(id, rows)));
     if (!list && !lockstep) enterPrivateBus();
     if (times > 0) return kill(bench, times);
     if (markdown)

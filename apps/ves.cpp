@@ -57,7 +57,7 @@ constexpr const char* kExamples =
     "ves replay newest --check                  through the controller again, bit for bit\n"
     "ves compare RUN RUN                        what differs between two runs\n"
     "ves controller puma_on_table_4_1 --plant   by hand, from a menu\n"
-    "ves sweep ramp --vary seed=1:100           one row a run\n";
+    "ves sweep ramp --vary seed=1:100:100       one row a run\n";
 constexpr const char* kFiles =
     "ves-runs/SCENARIO-DATE/     a run: experiment.yaml, run.lcmlog, series.csv, summary.json\n"
     "ves-runs/calibration.yaml   the last calibration from the menu\n"
@@ -153,7 +153,12 @@ int dispatch(int argc, char** argv) {
     printUsage(stdout);
   } else {
     printUsage(stderr);
-    if (!word.empty()) fmt::print(stderr, "\nves: unknown command '{}'\n", word);
+    std::vector<std::string_view> names;
+    for (const Command& c : kCommands) names.push_back(c.name);
+    const std::string meant = word.empty() ? "" : nearest(word, names);
+    if (!word.empty())
+      fmt::print(stderr, "\nves: unknown command '{}'{}\n", word,
+                 meant.empty() ? "" : fmt::format(", did you mean '{}'?", meant));
     return kBadInput;
   }
   return kDone;

@@ -69,6 +69,9 @@ TEST_F(Programs, BadInputIsOneLineAndStatusTwo) {
   EXPECT_NE(run("no_such_scenario").text.find("want one of alpha_sine, arm_on_desk"),
             std::string::npos);
   EXPECT_NE(run("z_sin").text.find("did you mean 'z_sine'?"), std::string::npos);
+  EXPECT_NE(run("z_sine --lockstp").text.find("did you mean --lockstep?"), std::string::npos);
+  EXPECT_NE(test::sh(app("replya")).text.find("did you mean 'replay'?"), std::string::npos);
+  EXPECT_NE(test::sh(app("faults") + "F1x").text.find("did you mean 'F"), std::string::npos);
 }
 
 TEST_F(Programs, HelpAndProgressFitATerminal) {

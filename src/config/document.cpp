@@ -11,7 +11,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "spelling.hpp"
+#include "ves/core/spelling.hpp"
 
 namespace ves {
 namespace {

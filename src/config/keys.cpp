@@ -9,7 +9,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "spelling.hpp"
+#include "ves/core/spelling.hpp"
 #include "ves/config/experiment.hpp"
 
 namespace ves {

@@ -6,7 +6,7 @@
 #include <charconv>
 #include <cmath>
 
-#include "spelling.hpp"
+#include "ves/core/spelling.hpp"
 #include "ves/config/document.hpp"
 #include "ves/config/keys.hpp"
 

@@ -9,7 +9,7 @@
 #include <cmath>
 #include <set>
 
-#include "spelling.hpp"
+#include "ves/core/spelling.hpp"
 #include "ves/config/xml.hpp"
 #include "ves/math/dense.hpp"
 
