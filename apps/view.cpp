@@ -95,6 +95,7 @@ int writeFilm(ViewOptions options) {
 
 int writePrint(const ViewOptions& options) {
   constexpr double kEveryTick = 1000.0;  // [1/s]
+  catchSignals();
   const PageFile page(recordedPage(options, kEveryTick));
   writeGiven("--png", options.png, print(page.path(), options.at, options.film));
   fmt::print("{}: 300 dots an inch\n", options.png);

@@ -147,8 +147,11 @@ class Browser {
                                                 {"deviceScaleFactor", scale},
                                                 {"mobile", false}});
     call("Page.navigate", {{"url", "file://" + std::filesystem::absolute(page).string()}});
-    for (int i = 0; i < 600 && evaluate("window.ves !== undefined && ves.count > 0") != true; ++i)
+    constexpr int kTries = 600;  // [-] of 0.1 s
+    for (int i = 0; evaluate("window.ves !== undefined && ves.count > 0") != true; ++i) {
+      if (i == kTries) throw InputError("Chromium does not show the page: it may be without WebGL");
       poll(nullptr, 0, 100);
+    }
     evaluate(
         fmt::format("document.body.classList.add('film'); window.dispatchEvent(new "
                     "Event('resize')); ves.look('{}'); 0",

@@ -51,6 +51,11 @@ class Live {
   begin(data) {
     this.edition = data.edition;
     this.waiting = null;
+    this.stands = false;
+    for (const id of ['mass', 'damping', 'stiffness']) {
+      element(id).value = 0;
+      element(id).nextElementSibling.textContent = '× 1';
+    }
     begin([new Recording(data.scene, data.width, [], new Curves(data.columns, true))]);
     element('stop').hidden = false;
     element('touch').hidden = !data.scene.simulated;
