@@ -180,7 +180,7 @@ struct Options {
   /// After addBus().
   void addPace(CLI::App& cli) {
     cli.add_option("--pace", process.pace, "[-] of real time, in lockstep; `view` changes it")
-        ->check(inRange(1e-3, kMostPace))
+        ->check(inRange(kLeastPace, kMostPace))
         ->needs(cli.get_option("--lockstep"));
   }
   /// Before any thread starts.

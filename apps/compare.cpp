@@ -34,9 +34,10 @@ struct Unit {
   const char* shown;
   double times;
 };
-constexpr Unit kShown[] = {{"_m", "mm", 1e3},  {"_rad", "deg", 180.0 / M_PI},
-                           {"_s", "ms", 1e3},  {"_share", "%", 100.0},
-                           {"_j", "mJ", 1e3},  {"_n", "N", 1.0},
+constexpr Unit kShown[] = {{"_m", "mm", 1e3},     {"_rad", "deg", 180.0 / M_PI},
+                           {"_lag_s", "ms", 1e3}, {"_delay_s", "ms", 1e3},
+                           {"_s", "s", 1.0},      {"_share", "%", 100.0},
+                           {"_j", "mJ", 1e3},     {"_n", "N", 1.0},
                            {"_nm", "N m", 1.0}};
 
 /// A key in words with its unit, what each run has, and of two runs the second over the first.
@@ -56,7 +57,7 @@ std::vector<std::string> rowOf(const KeyDifference& one) {
     if (one.values.size() == 2) row.push_back("");
     return row;
   }
-  name.resize(name.size() - unit->ending.size());
+  name.resize(name.rfind('_'));
   std::replace(name.begin(), name.end(), '_', ' ');
   std::vector<std::string> row = {fmt::format("{} [{}]", name, unit->shown)};
   for (const double x : numbers) row.push_back(fmt::format("{:.4g}", x * unit->times));

@@ -59,18 +59,11 @@ int writePage(const ViewOptions& options) {
 /// The page in a file of its own while it is filmed.
 class PageFile {
  public:
-  explicit PageFile(const std::string& text)
-      : path_(std::filesystem::temp_directory_path() / fmt::format("ves-page-{}.html", getpid())) {
-    writeGiven("page", path_.string(), text);
-  }
-  ~PageFile() {
-    std::error_code error;
-    std::filesystem::remove(path_, error);
-  }
-  const std::filesystem::path& path() const { return path_; }
+  explicit PageFile(const std::string& text) { writeGiven("page", path().string(), text); }
+  std::filesystem::path path() const { return folder_.path() / "page.html"; }
 
  private:
-  std::filesystem::path path_;
+  TemporaryFolder folder_;
 };
 
 int writeFilm(ViewOptions options) {
@@ -132,7 +125,8 @@ int servePage(const ViewOptions& options) {
           stderr,
           "warning: open to every machine that reaches {}:{}, not encrypted: whoever has this "
           "address sees the run{}\n",
-          listener.address, listener.port, live ? " and can ask it to stop" : "");
+          listener.address, listener.port,
+          live ? "; can stop it, and push and change it where it is simulated" : "");
     fmt::print(stderr, "open this address in a browser; Ctrl-C ends\n");
     std::fflush(stdout);
   }
@@ -217,6 +211,14 @@ int viewCommand(int argc, char** argv) {
     const auto* file = std::find_if(std::begin(files), std::end(files),
                                     [](const CLI::Option* o) { return o->count() > 0; });
     if (file == std::end(files)) return servePage(options);
+    const auto refuse = [&](const char* option, std::initializer_list<const CLI::Option*> with) {
+      const bool fits = std::find(with.begin(), with.end(), *file) != with.end();
+      if (cli.get_option(option)->count() > 0 && !fits)
+        throw InputError(fmt::format("{}: means nothing beside {}", option, (*file)->get_name()));
+    };
+    refuse("--from", {svg, video});
+    refuse("--to", {svg, video});
+    refuse("--look", {video, png});
     if (options.logs.empty() || (*file == svg && options.logs.size() > 1))
       throw InputError(
           fmt::format("{}: want {} log", (*file)->get_name(), *file == svg ? "one" : "a"));

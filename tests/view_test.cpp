@@ -390,6 +390,7 @@ TEST(PageMessage, IsOneOfFewAndWithinItsRange) {
                            "vehicle 1 -1 1 1 2",
                            "vehicle 1 1 1 1 nan",
                            "pace 1 -1",
+                           "pace 1 1e-12",
                            "pace 1 1e9",
                            "pace 1 nan",
                            "pace 1"})
@@ -624,6 +625,7 @@ class Live : public testing::Test {
                           });
     controllers.subscribe({channel::kRobot},
                           [this](const std::string&, const void* data, std::uint32_t size) {
+                            EXPECT_EQ(decode<robot_command_t>(data, size)->machine, 77);
                             const auto order = fromMessage(*decode<robot_command_t>(data, size));
                             ASSERT_TRUE(order);
                             pushes.push_back(std::get<PushOrder>(*order));
@@ -652,6 +654,10 @@ class Live : public testing::Test {
     state.order_source = last.header.source;
     state.order_sequence = answers ? last.header.sequence : -1;
     state.refusal = static_cast<int>(refusal);
+    leg_command_t command{};
+    command.header = state.header;
+    command.machine = 77;
+    controllers.publish(channel::kLegCommand, command);
     controllers.publish(channel::kState, state);
   }
   void describe(std::int64_t source, std::int64_t epoch, const std::vector<std::string>& set = {}) {

@@ -83,6 +83,18 @@ bool enterNetworkOf(const std::string& process) {
   return true;
 }
 
+bool raiseLoopback() {
+  const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  if (fd < 0) return false;
+  ifreq lo{};
+  std::strncpy(lo.ifr_name, "lo", sizeof lo.ifr_name - 1);
+  bool up = ioctl(fd, SIOCGIFFLAGS, &lo) == 0;
+  lo.ifr_flags = static_cast<short>(lo.ifr_flags | IFF_UP | IFF_RUNNING | IFF_MULTICAST);
+  up = up && ioctl(fd, SIOCSIFFLAGS, &lo) == 0;
+  close(fd);
+  return up;
+}
+
 }  // namespace
 
 void joinPrivateBus(const std::string& name) {
@@ -115,21 +127,16 @@ void enterPrivateBus() {
   const uid_t user = geteuid();
   const gid_t group = getegid();
   // Who may, keeps his own users, and with them the right to real time.
-  if (unshare(CLONE_NEWNET) != 0) {
+  if (unshare(CLONE_NEWNET) != 0 || !raiseLoopback()) {
     require(unshare(CLONE_NEWUSER | CLONE_NEWNET) == 0, "unshare");
     write("/proc/self/setgroups", "deny");
     write("/proc/self/uid_map", fmt::format("0 {} 1", user));
     write("/proc/self/gid_map", fmt::format("0 {} 1", group));
+    require(raiseLoopback(), "lo up");
   }
 
   const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   require(fd >= 0, "socket");
-  ifreq lo{};
-  std::strncpy(lo.ifr_name, "lo", sizeof lo.ifr_name - 1);
-  require(ioctl(fd, SIOCGIFFLAGS, &lo) == 0, "lo");
-  lo.ifr_flags = static_cast<short>(lo.ifr_flags | IFF_UP | IFF_RUNNING | IFF_MULTICAST);
-  require(ioctl(fd, SIOCSIFFLAGS, &lo) == 0, "lo up");
-
   rtentry route{};
   const auto address = [](sockaddr& to, const char* text) {
     sockaddr_in in{};

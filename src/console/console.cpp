@@ -107,13 +107,15 @@ class Console {
   }
 
   std::string statusLine(const state_t& s) const {
-    return fmt::format(
-        "[{} {:.1f} s{}] x {:+.1f} y {:+.1f} z {:+.1f} mm, {:+.2f} {:+.2f} {:+.2f} deg",
-        name(static_cast<Phase>(s.phase)),
-        static_cast<double>(s.header.sequence * experiment_.controller.period) *
-            kSecondPerNanosecond,
-        s.latched ? ", checks latched" : "", s.x[0] / kMillimetre, s.x[1] / kMillimetre,
-        s.x[2] / kMillimetre, s.x[3] / kDegree, s.x[4] / kDegree, s.x[5] / kDegree);
+    std::string out =
+        fmt::format("[{} {:.1f} s{}] x {:+.1f} y {:+.1f} z {:+.1f} mm, {:+.2f} {:+.2f} {:+.2f} deg",
+                    name(static_cast<Phase>(s.phase)),
+                    static_cast<double>(s.header.sequence * experiment_.controller.period) *
+                        kSecondPerNanosecond,
+                    s.latched ? ", latched" : "", s.x[0] / kMillimetre, s.x[1] / kMillimetre,
+                    s.x[2] / kMillimetre, s.x[3] / kDegree, s.x[4] / kDegree, s.x[5] / kDegree);
+    if (out.size() >= kColumns) out.resize(kColumns - 1);  // it must stay one line
+    return out;
   }
 
   void notice(const state_t& s) {

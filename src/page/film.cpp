@@ -11,6 +11,7 @@
 #include <zlib.h>
 
 #include <array>
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -97,6 +98,7 @@ class Child {
   bool write(const std::string& bytes) const {
     for (std::size_t at = 0; at < bytes.size();) {
       const ssize_t n = ::write(to_, bytes.data() + at, bytes.size() - at);
+      if (n < 0 && errno == EINTR) continue;
       if (n <= 0) return false;
       at += static_cast<std::size_t>(n);
     }
@@ -117,7 +119,8 @@ class Child {
   /// Its exit status, when it has ended by itself.
   int wait() {
     int status = 0;
-    waitpid(pid_, &status, 0);
+    while (waitpid(pid_, &status, 0) < 0 && errno == EINTR) {
+    }
     pid_ = -1;
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   }
@@ -132,11 +135,10 @@ class Child {
 class Browser {
  public:
   Browser(const std::filesystem::path& page, const FilmOptions& options, double scale)
-      : profile_(folder()),
-        child_({inPath({"chromium", "chromium-browser", "google-chrome"}), "--headless=new",
+      : child_({inPath({"chromium", "chromium-browser", "google-chrome"}), "--headless=new",
                 "--remote-debugging-pipe", "--no-sandbox", "--use-angle=swiftshader",
                 "--enable-unsafe-swiftshader", "--disable-dev-shm-usage", "--hide-scrollbars",
-                "--user-data-dir=" + profile_.string(), "about:blank"},
+                "--user-data-dir=" + (folder_.path() / "profile").string(), "about:blank"},
                3, 4) {
     const Answer target = call("Target.createTarget", {{"url", "about:blank"}});
     const Answer session =
@@ -152,16 +154,14 @@ class Browser {
       if (i == kTries) throw InputError("Chromium does not show the page: it may be without WebGL");
       poll(nullptr, 0, 100);
     }
+    if (options.look == "arm" && evaluate("VES_RECORDINGS[0].scene.arm.length > 1") != true)
+      throw InputError("--look arm: there is no arm in this run");
     evaluate(
         fmt::format("document.body.classList.add('film'); window.dispatchEvent(new "
                     "Event('resize')); ves.look('{}'); 0",
                     options.look));
   }
-  ~Browser() {
-    std::error_code error;
-    child_.end();
-    std::filesystem::remove_all(profile_, error);
-  }
+  ~Browser() { child_.end(); }  // before its folder goes
 
   Answer evaluate(const std::string& script) {
     const Answer answer =
@@ -176,11 +176,6 @@ class Browser {
   }
 
  private:
-  static std::filesystem::path folder() {
-    std::string name = (std::filesystem::temp_directory_path() / "ves-film-XXXXXX").string();
-    if (!mkdtemp(name.data())) throw InputError("no folder for temporary files");
-    return name;
-  }
   Answer call(const char* method, const Answer& parameters) {
     Answer message = {{"id", ++asked_}, {"method", method}, {"params", parameters}};
     if (!session_.empty()) message["sessionId"] = session_;
@@ -203,14 +198,15 @@ class Browser {
       }
       pollfd wait{child_.output(), POLLIN, 0};
       std::array<char, 65536> piece;
-      const ssize_t n =
-          poll(&wait, 1, kPatience) > 0 ? read(child_.output(), piece.data(), piece.size()) : 0;
+      const int ready = poll(&wait, 1, kPatience);
+      if (ready < 0 && errno == EINTR) continue;  // the picture in hand is finished first
+      const ssize_t n = ready > 0 ? read(child_.output(), piece.data(), piece.size()) : 0;
       if (n <= 0) throw InputError("Chromium does not answer");
       heard_.append(piece.data(), static_cast<std::size_t>(n));
     }
   }
 
-  std::filesystem::path profile_;
+  TemporaryFolder folder_;
   Child child_;
   std::string session_, heard_;
   int asked_ = 0;
@@ -237,6 +233,16 @@ std::string withResolution(const std::string& png, double dots_per_inch) {
 }
 
 }  // namespace
+
+TemporaryFolder::TemporaryFolder() {
+  std::string name = (std::filesystem::temp_directory_path() / "ves-XXXXXX").string();
+  if (!mkdtemp(name.data())) throw InputError("no folder for temporary files");
+  path_ = name;
+}
+TemporaryFolder::~TemporaryFolder() {
+  std::error_code error;
+  std::filesystem::remove_all(path_, error);
+}
 
 void film(const std::filesystem::path& page, const std::filesystem::path& to,
           const FilmOptions& options, const std::function<bool(int, int)>& seen) {

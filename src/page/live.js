@@ -3,7 +3,7 @@
 const KEPT = 60;          // [s] of a live run
 const REDRAWN = 250;      // [ms] between a live run's charts
 const NEWTONS = 0.25;     // [N] a pixel of the mouse's way
-const MOST = 200;         // [N] of a push
+const MOST = 199.9;       // [N] of a push, and rounding
 const TRIES = 5;          // to connect again
 const SETTLED = 400;      // [ms] without a touch of a slider, before it is asked for
 
@@ -89,7 +89,7 @@ class Live {
       shown = Math.max(0, shown - old);
     }
     element('seek').max = first.count - 1;
-    element('paces').hidden = first.scalar(first.count - 1, 'lockstep') !== 1;
+    element('paces').hidden = isNaN(first.scalar(first.count - 1, 'pace'));
     if (playing) show(first.count - 1);
     if (now - this.redrawn < REDRAWN) return;
     this.redrawn = now;
@@ -99,8 +99,9 @@ class Live {
   lines(i) {
     const out = [], refusal = first.scalar(i, 'vehicle_refusal');
     const stop = first.scalar(i, 'stop_asked'), vehicle = first.scalar(i, 'vehicle_asked');
-    if (stop) out.push(stop < 2 ? 'stop requested' : 'stop requested from a browser, and taken');
+    if (stop) out.push(['', 'stop requested', first.scalar(i, 'stop_refusal') ? 'stop requested, and overtaken' : 'stop requested from a browser, and taken', 'stop requested, and no answer'][stop]);
     if (vehicle === 1) out.push('vehicle: the stability check is asked');
+    if (vehicle === 3) out.push('vehicle: no answer');
     if (vehicle === 2) out.push(refusal ? `vehicle: refused, ${nameOf('refusals', refusal)}` : 'vehicle: taken');
     const c = first.curves, last = c.count - 1, factors = ['mass', 'damping', 'stiffness'].map(n => c.at(`vehicle_${n}`, last));
     if (factors.some(f => Math.abs(f - 1) > 1e-9)) out.push(`vehicle's mass, damping, stiffness × ${factors.map(f => +f.toPrecision(3)).join(', ')}`);

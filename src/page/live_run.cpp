@@ -32,14 +32,18 @@ std::vector<TimedAction> allPushes(const Experiment& e, const std::vector<TimedA
 LiveRun::LiveRun(const std::string& url, const std::string& results)
     : bus_(url), results_(results) {
   bus_.subscribe({channel::kSample, channel::kState, channel::kTruth, channel::kTiming,
-                  channel::kExperiment, channel::kSetup},
+                  channel::kExperiment, channel::kLegCommand, channel::kPace},
                  [this](const std::string& channel, const void* data, std::uint32_t size) {
                    if (channel == channel::kState) {
                      if (const auto m = decode<state_t>(data, size)) takeState(*m);
                    } else if (channel == channel::kExperiment) {
                      if (const auto m = decode<experiment_t>(data, size)) takeExperiment(*m);
-                   } else if (channel == channel::kSetup) {
-                     if (const auto m = decode<setup_t>(data, size)) setup_ = *m;
+                   } else if (channel == channel::kLegCommand) {
+                     const auto m = decode<leg_command_t>(data, size);
+                     if (m && m->header.source == controller_.source) machine_ = m->machine;
+                   } else if (channel == channel::kPace) {
+                     const auto m = decode<pace_t>(data, size);
+                     if (m && machine_ != 0 && m->header.source == machine_) pace_ = m->rate;
                    } else if (channel == channel::kTruth) {
                      if (const auto m = decode<truth_t>(data, size)) rows_.add(*m);
                    } else if (channel == channel::kSample) {
@@ -69,6 +73,7 @@ bool LiveRun::follow(const state_t& state) {
   const bool engaged = state.engaged != 0, other = shown && state_->engaged != 0;
   if (shown && (engaged == other ? from.epoch < controller_.epoch : other)) return false;
   controller_ = from;
+  machine_ = 0;
   state_.reset();
   rows_ = {};
   row_.reset();
@@ -133,7 +138,7 @@ void LiveRun::describe() {
   text["scene"]["results"] = results_;
   auto& scalars = text["scene"]["scalars"];
   for (const char* name :
-       {"stop_asked", "stop_refusal", "vehicle_asked", "vehicle_refusal", "pace", "lockstep"})
+       {"stop_asked", "stop_refusal", "vehicle_asked", "vehicle_refusal", "pace"})
     scalars.push_back(name);
   auto refusals = nlohmann::ordered_json::array();
   for (int i = 0; i < static_cast<int>(Refusal::kCount); ++i)
@@ -141,7 +146,7 @@ void LiveRun::describe() {
   text["scene"]["refusals"] = refusals;
   text["columns"] = curves_->description();
   text["columns"].push_back({{"name", "real_time_factor"}, {"meaning", "of the last second"}});
-  text["width"] = scene_->width() + 6 + curves_->size() + 1;
+  text["width"] = scene_->width() + 5 + curves_->size() + 1;
   scene_text_ = text.dump();
 }
 
@@ -151,7 +156,7 @@ void LiveRun::followBase(const state_t& state) {
   const auto runs = [](const state_t& s) { return s.segment >= 0 && inAdmittance(s); };
   if (state_ && !let_go_ && runs(state) && !runs(*state_))
     let_go_ = LetGo{state.header.sequence, Vec6::Map(state.x_desired), false};
-  if (let_go_ && !let_go_->computed && experiment_ && !computing_.valid()) {
+  if (let_go_ && !let_go_->computed && !let_go_->changed && experiment_ && !computing_.valid()) {
     let_go_->computed = true;
     computing_ = std::async(std::launch::async,
                             [e = *experiment_, x = let_go_->x, told = let_go_->pushes.list()] {
@@ -165,7 +170,8 @@ void LiveRun::followBase(const state_t& state) {
     const auto base = computing_.get();
     if (let_go_ && let_go_->computed) base_ = base;
   }
-  if (!ofConfiguredVehicle(state)) base_.reset();
+  if (let_go_ && !ofConfiguredVehicle(state)) let_go_->changed = true;
+  if (let_go_ && let_go_->changed) base_.reset();
 }
 
 void LiveRun::measureRate(const state_t& state) {
@@ -222,6 +228,7 @@ void LiveRun::take(const PageMessage& message) {
   if (push || pace || vehicle) {  // of a machine with real pieces only a stop
     if (!experiment_->machine.simulated()) return;
     if (push && !whyNotPushed(*experiment_, *push).empty()) return;
+    if ((push || pace) && machine_ == 0) return;
   }
   const std::int64_t now = monotonicNow();
   if (push) {
@@ -233,7 +240,6 @@ void LiveRun::take(const PageMessage& message) {
     order.vehicle = *vehicle;
     ask(vehicle_, order, kVehicleTimes);  // the newest counts
   } else if (pace) {
-    pace_ = pace->rate;
     bus_.publish(channel::kPace, pace_t{header(self_, sent_++, now), machine_, pace->rate});
   } else if (!stop_ || !stop_->underWay()) {
     ask(stop_, Order{Request::kStop, {}, {}}, kStopTimes);
@@ -245,18 +251,15 @@ void LiveRun::keepPicture() {
   std::optional<Vec6> base;
   if (base_) base = base_->point(row_->state.header.sequence - let_go_->tick);
   Picture one{newest_, row_->state.header.time_ns, rate_, scene_->picture(*row_, base)};
-  // 0: nothing asked, 1: not answered yet, 2: answered, and how
+  // 0: nothing asked, 1: not answered yet, 2: answered, and how, 3: no answer came
   const auto tell = [&](const std::optional<Asked>& asked) {
-    one.numbers.push_back(!asked ? 0.0f : asked->answer ? 2.0f : 1.0f);
+    one.numbers.push_back(!asked ? 0.0f : asked->answer ? 2.0f : asked->underWay() ? 1.0f : 3.0f);
     one.numbers.push_back(
         asked && asked->answer ? static_cast<float>(static_cast<int>(*asked->answer)) : NAN);
   };
   tell(stop_);
   tell(vehicle_);
   one.numbers.push_back(static_cast<float>(pace_));
-  const bool lockstep =
-      setup_ && setup_->header.source == controller_.source && setup_->lockstep != 0;
-  one.numbers.push_back(lockstep ? 1.0f : 0.0f);
   const std::vector<float> curves = curves_->of(*row_, base);
   one.numbers.insert(one.numbers.end(), curves.begin(), curves.end());
   one.numbers.push_back(static_cast<float>(rate_));

@@ -90,7 +90,7 @@ std::optional<PageMessage> parsePageMessage(std::string_view text) {
     out.what = order.vehicle;
   } else if (kind == "pace") {
     const double rate = number();
-    good = good && rate >= 0.0 && rate <= kMostPace;
+    good = good && (rate == 0.0 || (rate >= kLeastPace && rate <= kMostPace));
     out.what = PageMessage::Pace{rate};
   } else {
     return {};

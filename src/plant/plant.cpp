@@ -243,7 +243,8 @@ Wrench Plant::meetWorld(double dt) noexcept {
   const bool held = world.release >= 0 && began_[static_cast<std::size_t>(world.release)] == kNever;
   Floating target = truth_.target;
   if (held) target.v = target.w = Vec3::Zero();
-  if (truth_.push && truth_.push->push.on == Push::On::kTarget) {
+  if (truth_.push && truth_.push->push.on == Push::On::kTarget &&
+      truth_.push->share(last_step_ - std::llround(dt * 1e9), now_) > 0.0) {
     const Wrench on_target_Bo_I = pushed(last_step_ - std::llround(dt * 1e9));
     const FloatingRates with = rates(world.environment, target, on_target_Bo_I),
                         without = rates(world.environment, target, Wrench{});
@@ -323,7 +324,8 @@ void Plant::stepMechanics() noexcept {
 
   Wrench F_So_S = sensorLoad();
   if (config_.task.world) F_So_S = F_So_S + meetWorld(dt);
-  if (truth_.push && truth_.push->push.on != Push::On::kTarget) {
+  if (truth_.push && truth_.push->push.on != Push::On::kTarget &&
+      truth_.push->share(before, now_) > 0.0) {
     const Transform X_IS = truth_.P.X * config_.payload.X_PS;
     F_So_S = F_So_S + rotate(X_IS.R.transpose(), shift(pushed(before), X_IS.p - truth_.P.X.p));
   }

@@ -110,10 +110,10 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
           throw InputError(fmt::format("bus {}: no machine in lockstep answers", options.url));
         link.send(out);
         const std::int64_t until = monotonicNow() + kAnswerTime * 1'000'000LL,
-                           heard = link.samples();
+                           heard = link.samples(), before = link.sample().sequence;
         while (link.answers() != in.tick - 1 && monotonicNow() < until) bus.waitAwake(kAnswerTime);
-        if (link.samples() > heard) i = 0;
-        if (wantsOut()) return letGo();
+        if (link.samples() > heard && link.sample().sequence == before) i = 0;
+        if (in.tick == 0 && wantsOut()) return letGo();
       }
       in.sample = link.sample();
       if (in.tick == 0) first = in.sample.time;

@@ -85,7 +85,7 @@ sample_t MachineProcess::publish(std::int64_t answers) {
 /// One period for each command, and one sample in answer; a repeated command gets the same one.
 void MachineProcess::inLockstep(const std::function<bool()>& stop) {
   const std::int64_t period = experiment_.controller.period;
-  Pace pace(bus_, self_.source, options_.pace);
+  Pace pace(bus_, self_, options_.pace);
   std::int64_t answered = -2;  // tick
   std::int64_t start = 0;      // [ns] plant time of the controller's tick 0
   sample_t last;

@@ -19,7 +19,10 @@ constexpr std::int64_t kFirstState = 15'000'000'000;  // [ns]
 }  // namespace
 
 Session::Session(const Experiment& experiment, const LaunchOptions& options)
-    : experiment_(experiment), bus_(options.process.url), start_(monotonicNow()) {
+    : experiment_(experiment),
+      paced_(options.process.pace),
+      bus_(options.process.url),
+      start_(monotonicNow()) {
   const ProcessOptions& process = options.process;
   if (!process.log.empty() && !process.lockstep) {
     log_file_ = process.log;
@@ -122,7 +125,11 @@ void Session::orderRobot(const RobotOrder& order) {
 }
 
 void Session::interrupt() {
-  if (!std::exchange(interrupted_, true)) controller_->signal(SIGINT);
+  if (std::exchange(interrupted_, true)) return;
+  controller_->signal(SIGINT);
+  if (paced_)  // time that is held would keep the platform from going home
+    bus_.publish(channel::kPace,
+                 pace_t{header(self_, orders_++, monotonicNow()), machine_, kMostPace});
 }
 
 RunResult Session::result() {

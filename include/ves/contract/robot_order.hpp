@@ -60,7 +60,7 @@ inline constexpr std::string_view kPushedNames[] = {"platform", "tool", "target"
 inline constexpr double kMostPush = 200.0;                          // [N] that a person pushes
 inline constexpr double kShortestPush = 1e-3, kLongestPush = 60.0;  // [s]
 
-inline constexpr double kMostPace = 1000.0;  // [-] of real time, of a machine in lockstep
+inline constexpr double kLeastPace = 1e-3, kMostPace = 1000.0;  // [-] of real time, in lockstep
 
 using RobotOrder = std::variant<RobotMove, ToolOrder, HandOrder, Release, PushOrder>;
 

@@ -17,6 +17,20 @@ struct FilmOptions {
   std::string look = "iso";        // front, side, top, arm
 };
 
+/// Gone, with what is in it, when this is.
+class TemporaryFolder {
+ public:
+  TemporaryFolder();
+  ~TemporaryFolder();
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
 /// `page` is a file that view --html wrote. The kind of film is the name's ending, as ffmpeg knows
 /// them (.mp4, .webm, .gif). `seen` is told how many pictures of how many are done; false ends it.
 /// Throws InputError where Chromium or ffmpeg is missing or fails.

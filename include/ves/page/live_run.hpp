@@ -33,7 +33,7 @@ class LiveRun : public LiveSource {
   std::int64_t newest() const override { return newest_; }
   /// Three doubles {number, header.time_ns of the state, real-time factor} of the last one; then of
   /// each, the oldest first, the floats of Scene::picture, those of Asked for a stop and a vehicle,
-  /// the pace that was asked for last, whether it is lockstep, and those of Curves; little-endian.
+  /// the pace of the machine, and those of Curves; little-endian.
   /// One of every state that was heard: who draws seldom misses no sample.
   std::string pictures(std::int64_t after, std::int64_t& last) const override;
   void take(const PageMessage& message) override;
@@ -54,7 +54,7 @@ class LiveRun : public LiveSource {
   std::int64_t sent_ = 0;  // [-] messages
 
   Identity controller_;       // that is shown
-  std::int64_t machine_ = 0;  // [-] header.source of what it commands
+  std::int64_t machine_ = 0;  // [-] header.source of what it commands; 0: not known
   std::int64_t heard_ = 0;    // [ns] its last state
   std::optional<state_t> state_;
   RowMaker rows_;
@@ -68,7 +68,6 @@ class LiveRun : public LiveSource {
   std::deque<Picture> pictures_;  // of this scene, the last the newest
 
   std::optional<experiment_t> described_;  // the last
-  std::optional<setup_t> setup_;           // the last
   bool warned_ = false;                    // that it cannot be read
   std::optional<Experiment> experiment_;
   std::optional<Scene> scene_;
@@ -83,6 +82,7 @@ class LiveRun : public LiveSource {
     std::int64_t tick;
     Vec6 x;  // [m, rad] from home
     bool computed;
+    bool changed = false;  // the vehicle is another one than the configuration's, or was
     ToldPushes pushes = {};
   };
   std::optional<LetGo> let_go_;
@@ -106,7 +106,7 @@ class LiveRun : public LiveSource {
   void repeat(std::optional<Asked>& asked);
   void hearAnswer(std::optional<Asked>& asked, const state_t& state) const;
   std::optional<Asked> stop_, vehicle_;
-  double pace_ = NAN;  // [-] asked for last
+  double pace_ = NAN;  // [-] as the machine says; NaN: it has none
 };
 
 }  // namespace ves

@@ -53,6 +53,7 @@ class Session {
   void receive(const std::string& channel, const void* data, std::uint32_t size);
 
   const Experiment& experiment_;
+  bool paced_;  // by a clock that somebody may hold
   Identity self_ = Identity::draw();
   Bus bus_;
   std::unique_ptr<LogWriter> log_;
