@@ -101,6 +101,16 @@ TEST_F(Programs, HelpAndProgressFitATerminal) {
     EXPECT_TRUE(line.size() <= 80 || line.find(folder_.string()) != std::string::npos) << line;
 }
 
+TEST_F(Programs, CtrlCInAPacedRunGoesHome) {
+  const Output o = test::sh("timeout --preserve-status -s INT 2 " + app("run") +
+                            "z_sine --lockstep --pace 1 --private-bus --no-plots" + out("a"));
+  EXPECT_EQ(o.status, 0) << o.text;
+  EXPECT_NE(o.text.find("returning"), std::string::npos) << o.text;
+  const auto s = summary(folder_ / "a");
+  EXPECT_EQ(s["ended"], "parked");
+  EXPECT_NE(s["ended_early"].get<std::string>().find("a stop was requested"), std::string::npos);
+}
+
 TEST_F(Programs, ARunThatIsThereIsKept) {
   ASSERT_EQ(run("ramp --lockstep --no-plots" + out("a")).status, 0);
   const std::string before = test::readText((folder_ / "a/summary.json").string());
