@@ -59,10 +59,6 @@ Sets compensationOf(const std::string& name) {
   return sets;
 }
 
-}  // namespace
-
-namespace {
-
 /// Which row was meant, as far as its name tells.
 std::string rowMeant(const std::string& id, const std::vector<FaultRow>& rows) {
   std::vector<std::string> ids;

@@ -27,7 +27,7 @@ struct ViewOptions {
   std::string results;
 };
 
-/// A run's folder stands for the log in it.
+/// What a legend calls it: the run's folder, or the log's own name.
 std::string nameOfLog(const std::string& log) {
   const std::filesystem::path path(log);
   return path.filename() == "run.lcmlog" && path.has_parent_path()

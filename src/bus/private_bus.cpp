@@ -74,8 +74,8 @@ bool enterNetworkOf(const std::string& process) {
   const File user("/proc/" + process + "/ns/user", O_RDONLY);
   const File network("/proc/" + process + "/ns/net", O_RDONLY);
   if (user.descriptor < 0 || network.descriptor < 0) return false;
-  struct stat its {
-  }, ours{};
+  struct stat its;
+  struct stat ours;
   const bool own = fstat(user.descriptor, &its) == 0 && stat("/proc/self/ns/user", &ours) == 0 &&
                    its.st_ino == ours.st_ino;
   require(own || setns(user.descriptor, CLONE_NEWUSER) == 0, "its users");

@@ -17,22 +17,12 @@ using Json = nlohmann::ordered_json;
 
 constexpr int kUnknown = 65535, kMostCount = 65534;  // [-]
 
-/// Before the calibration that is to come, the wrench is the sensor's bias, as large as the robot's
-/// weight.
-void hideUncalibrated(const Experiment& e, std::vector<Column>& columns) {
-  const Program& program = e.controller.program;
-  const auto* const end = program.segments.begin() + program.size;
-  if (std::none_of(program.segments.begin(), end,
-                   [](const Segment& s) { return s.kind == SegmentKind::kCalibration; }))
-    return;
-  for (Column& column : columns)
-    if (column.name.find("_dynamic_") != std::string::npos)
-      column.value = [value = column.value](const Row& r) {
-        return calibrated(r.state) ? value(r) : NAN;
-      };
-}
-
 }  // namespace
+
+bool calibrates(const Program& program) noexcept {
+  return std::any_of(program.segments.begin(), program.segments.begin() + program.size,
+                     [](const Segment& s) { return s.kind == SegmentKind::kCalibration; });
+}
 
 bool calibrated(const state_t& state) noexcept {
   return state.kind != static_cast<int>(SegmentKind::kCalibration) &&
@@ -41,7 +31,12 @@ bool calibrated(const state_t& state) noexcept {
 }
 
 Curves::Curves(const Experiment& experiment) : columns_(columns(experiment)) {
-  hideUncalibrated(experiment, columns_);
+  if (!calibrates(experiment.controller.program)) return;
+  for (Column& column : columns_)
+    if (column.name.find("_dynamic_") != std::string::npos)
+      column.value = [value = column.value](const Row& r) {
+        return calibrated(r.state) ? value(r) : NAN;
+      };
 }
 
 nlohmann::ordered_json Curves::description() const {

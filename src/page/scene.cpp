@@ -127,9 +127,7 @@ Scene::Scene(const Experiment& e)
   add("kind", [](const Row& r) { return static_cast<double>(r.state.kind); });
   add("cause", [](const Row& r) { return static_cast<double>(r.state.cause); });
   const Program& program = e.controller.program;
-  const bool waits =
-      std::any_of(program.segments.begin(), program.segments.begin() + program.size,
-                  [](const Segment& s) { return s.kind == SegmentKind::kCalibration; });
+  const bool waits = calibrates(program);
   for (int i = 0; i < 3; ++i)
     add(fmt::format("{}_dynamic", wrenchComponent(i).name), [i, waits](const Row& r) {
       return calibrated(r.state) || !waits ? r.state.dynamic[i] : NAN;
@@ -160,9 +158,7 @@ Scene::Scene(const Experiment& e)
     addPush(fmt::format("push_f{}", coordinate(i).name),
             [i](const truth_t& m) { return m.push_force[i]; });
   }
-  description_["emulates"] =
-      std::any_of(program.segments.begin(), program.segments.begin() + program.size,
-                  [](const Segment& s) { return s.kind == SegmentKind::kAdmittance; });
+  description_["emulates"] = wantsAdmittance(program);
   description_["simulated"] = e.machine.simulated();
   description_["target"] = target_.has_value();
 

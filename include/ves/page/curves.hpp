@@ -12,7 +12,9 @@
 
 namespace ves {
 
-/// Whether the wrench without gravity is more than the sensor's bias.
+/// Whether the program calibrates the sensor, and has done so: before that the wrench without
+/// gravity is the sensor's bias, as large as the robot's weight.
+bool calibrates(const Program& program) noexcept;
 bool calibrated(const state_t& state) noexcept;
 
 class Curves {
