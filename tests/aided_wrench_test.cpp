@@ -49,23 +49,21 @@ ControllerConfig pendulum(ControllerConfig c) {
 
 double angle(double t) { return kSwing * std::sin(kRate * t); }
 
-/// F_Po_P on a platform that turns at w_IP_P, written out: a mass on a circle, and what turns it;
-/// the angular momentum's rate by central differences.
-Vec6 reaction(double t, const Vec3& w) {
-  const double q = angle(t), rate = kSwing * kRate * std::cos(kRate * t),
-               acceleration = -kRate * kRate * q;
+/// Momentum about Po on a platform at rest, written out: a mass on a circle, and what turns it.
+Vec6 momentum(double t) {
+  const double q = angle(t), rate = kSwing * kRate * std::cos(kRate * t);
   const Vec3 radial(std::cos(q), std::sin(q), 0.0), tangent(-std::sin(q), std::cos(q), 0.0);
-  const Vec3 p = kAxle + kReach * radial, v = kReach * rate * tangent,
-             a = kReach * (acceleration * tangent - rate * rate * radial);
-  const Vec3 f = -kMass * (a + 2.0 * w.cross(v) + w.cross(w.cross(p)));
-  const auto momentum = [&](double at) -> Vec3 {
-    const Mat3 R = Eigen::AngleAxisd(angle(at), Vec3::UnitZ()).toRotationMatrix();
-    const Mat3 I_P = R * Vec3(0.1, kInertia, kInertia).asDiagonal() * R.transpose();
-    return I_P * (w + kSwing * kRate * std::cos(kRate * at) * Vec3::UnitZ());
-  };
+  const Vec3 P = kMass * kReach * rate * tangent;
+  return (Vec6() << P, (kAxle + kReach * radial).cross(P) + kInertia * rate * Vec3::UnitZ())
+      .finished();
+}
+
+/// F_Po_P of it on a platform that turns at w_IP_P.
+Vec6 reaction(double t, const Vec3& w) {
   constexpr double h = 1e-5;  // [s]
-  const Vec3 turns = (momentum(t + h) - momentum(t - h)) / (2.0 * h) + w.cross(momentum(t));
-  return (Vec6() << f, p.cross(f) - turns).finished();
+  const Vec6 H = momentum(t);
+  const Vec6 turned = (Vec6() << w.cross(H.head<3>()), w.cross(H.tail<3>())).finished();
+  return -(momentum(t + h) - momentum(t - h)) / (2.0 * h) - turned;
 }
 
 /// Behind w^2 / (s^2 + sqrt(2) w s + w^2) by small Runge-Kutta steps, averaged over `window` [s] up
@@ -90,7 +88,7 @@ Vec6 filtered(double w, double until, double window, const Vec3& turning = Vec3:
   return n > 0 ? Vec6(sum / n) : y;
 }
 
-TEST(JointReaction, IsWhatTheSensorShowsOfALinkThatSwings) {
+TEST(JointMomentum, IsWhatTheSensorShowsOfALinkThatSwings) {
   for (const auto& [averaged, late, turning] :
        {std::tuple{false, 0.0, Vec3(0.0, 0.0, 0.0)}, std::tuple{true, 0.0, Vec3(0.0, 0.0, 0.0)},
         std::tuple{false, 0.002, Vec3(0.0, 0.0, 0.0)},
@@ -100,13 +98,14 @@ TEST(JointReaction, IsWhatTheSensorShowsOfALinkThatSwings) {
         pendulum(config({averaged ? "sensor.readings_per_tick=4" : "sensor.readings_per_tick=1"}));
     c.servo.sensor_delay = late;
     KnownPayload known(c);
-    JointReaction joints(c);
+    JointMomentum joints(c);
     Vec6 most = Vec6::Zero(), off = Vec6::Zero();
     for (int k = 0; k <= 150; ++k) {
       Sample s;
       s.time = s.wrench_time = s.joints_time = k * kTick;
       s.q(0) = angle(1e-2 * k);
-      const Vec6 F = joints.update(known, s, turning).stacked();
+      joints.update(known, s, Mat3::Identity(), 1e-2);
+      const Vec6 F = joints.shown(turning).stacked();
       if (k < 50 || k % 5 != 0) continue;
       const Vec6 should =
           filtered(c.servo.sensor_cutoff, 1e-2 * k - late, averaged ? 1e-2 : 0.0, turning);
@@ -117,10 +116,10 @@ TEST(JointReaction, IsWhatTheSensorShowsOfALinkThatSwings) {
   }
 }
 
-TEST(JointReaction, KnowsSamplesThatComeUnevenlyAndAWrenchThatIsOlder) {
+TEST(JointMomentum, KnowsSamplesThatComeUnevenlyAndAWrenchThatIsOlder) {
   const ControllerConfig c = pendulum(config());
   KnownPayload known(c);
-  JointReaction joints(c);
+  JointMomentum joints(c);
   std::mt19937 random(5);
   std::uniform_int_distribution<std::int64_t> jitter(-2'000'000, 2'000'000);
   double off = 0.0, most = 0.0;
@@ -129,7 +128,8 @@ TEST(JointReaction, KnowsSamplesThatComeUnevenlyAndAWrenchThatIsOlder) {
     s.time = s.joints_time = k * kTick + jitter(random);
     s.wrench_time = s.joints_time - 4'000'000;
     s.q(0) = angle(1e-9 * static_cast<double>(s.joints_time));
-    const double F = joints.update(known, s, Vec3::Zero()).f(1);
+    joints.update(known, s, Mat3::Identity(), 1e-2);
+    const double F = joints.shown(Vec3::Zero()).f(1);
     if (k < 50 || k % 10 != 0) continue;
     const double should =
         filtered(c.servo.sensor_cutoff, 1e-9 * static_cast<double>(s.wrench_time), 0.0)(1);
@@ -139,39 +139,44 @@ TEST(JointReaction, KnowsSamplesThatComeUnevenlyAndAWrenchThatIsOlder) {
   EXPECT_LT(off, 0.01 * most);
 }
 
-TEST(JointReaction, JointsThatStandGiveNoneAndAPauseBeginsAnew) {
+TEST(JointMomentum, JointsThatStandGiveNoneAndAPauseBeginsAnew) {
   const ControllerConfig c = pendulum(config());
   KnownPayload known(c);
-  JointReaction joints(c);
+  JointMomentum joints(c);
   for (int k = 0; k < 20; ++k) {
     Sample s;
     s.wrench_time = s.joints_time = k * kTick;
     s.q(0) = 0.7;
-    EXPECT_EQ(joints.update(known, s, Vec3::Zero()).stacked(), Vec6(Vec6::Zero()));
+    joints.update(known, s, Mat3::Identity(), 1e-2);
+    EXPECT_EQ(joints.shown(Vec3::Zero()).stacked(), Vec6(Vec6::Zero()));
+    EXPECT_EQ(joints.force().stacked(), Vec6(Vec6::Zero()));
   }
-  joints.reset();
+  joints.reset(JointVector::Zero());
   for (int k = 0; k < 2; ++k) {  // where it was before the pause is no speed
     Sample s;
     s.wrench_time = s.joints_time = (500 + k) * kTick;
     s.q(0) = -0.7 + 0.1 * k;
-    EXPECT_EQ(joints.update(known, s, Vec3::Zero()).stacked(), Vec6(Vec6::Zero()));
+    joints.update(known, s, Mat3::Identity(), 1e-2);
+    EXPECT_EQ(joints.shown(Vec3::Zero()).stacked(), Vec6(Vec6::Zero()));
+    EXPECT_EQ(joints.force().stacked(), Vec6(Vec6::Zero()));
   }
 }
 
-TEST(JointReaction, StaysWhereADriverOfTheJointsIsSlowerThanTheTick) {
+TEST(JointMomentum, StaysWhereADriverOfTheJointsIsSlowerThanTheTick) {
   for (const bool averaged : {false, true})
     for (const int every : {2, 3}) {  // [-] ticks
       const ControllerConfig c = pendulum(
           config({averaged ? "sensor.readings_per_tick=4" : "sensor.readings_per_tick=1"}));
       KnownPayload known(c);
-      JointReaction joints(c);
+      JointMomentum joints(c);
       double off = 0.0, most = 0.0;
       for (int k = 0; k <= 150; ++k) {
         Sample s;
         s.time = s.wrench_time = k * kTick;
         s.joints_time = k / every * every * kTick;
         s.q(0) = angle(1e-2 * (k / every * every));
-        const double F = joints.update(known, s, Vec3::Zero()).f(1);
+        joints.update(known, s, Mat3::Identity(), 1e-2);
+        const double F = joints.shown(Vec3::Zero()).f(1);
         if (k < 50) continue;
         const double should = filtered(c.servo.sensor_cutoff, 1e-2 * k, averaged ? 1e-2 : 0.0)(1);
         off = std::max(off, std::abs(F - should));
@@ -182,15 +187,17 @@ TEST(JointReaction, StaysWhereADriverOfTheJointsIsSlowerThanTheTick) {
     }
 }
 
-TEST(JointReaction, AnglesThatAreOlderBeginAnew) {
+TEST(JointMomentum, AnglesThatAreOlderBeginAnew) {
   const ControllerConfig c = pendulum(config());
   KnownPayload known(c);
-  JointReaction joints(c);
+  JointMomentum joints(c);
   for (const std::int64_t time : {0, 1, 2, 2, 3, 1, 2, 3}) {
     Sample s;
     s.wrench_time = s.joints_time = time * kTick;
     s.q(0) = angle(1e-2 * static_cast<double>(time));
-    EXPECT_TRUE(joints.update(known, s, Vec3::Zero()).stacked().allFinite()) << time;
+    joints.update(known, s, Mat3::Identity(), 1e-2);
+    EXPECT_TRUE(joints.shown(Vec3::Zero()).stacked().allFinite()) << time;
+    EXPECT_TRUE(joints.force().stacked().allFinite()) << time;
   }
 }
 
@@ -315,7 +322,7 @@ TEST(AidedWrench, KnowsWhatRoundedLegsMakeOfWeightAndInertia) {
   for (int i = 0; i < kWrenchChannels; ++i)
     adc[static_cast<std::size_t>(i)] = static_cast<int>(std::lround(counts(i)));
   SampleStream samples(c.period);
-  KnownPayload known(c);
+  JointMomentum joints(c);
   AidedWrench aided(c);
   Sample s;
   s.q = q;
@@ -328,7 +335,8 @@ TEST(AidedWrench, KnowsWhatRoundedLegsMakeOfWeightAndInertia) {
   }
   ASSERT_TRUE(bias.calibrated());
   const Wrench static_wrench = gravityCompensation(c.payload, X_IP.R, F_So_S);
-  aided.update({Wrench{}, static_wrench, M_1, Vec3::Zero(), known, samples, bias, X_IP, 1.0}, true);
+  aided.update({Wrench{}, static_wrench, M_1, Vec3::Zero(), joints, samples, bias, X_IP, 1.0},
+               true);
   EXPECT_LT((aided.noise().weight - weight).norm(), 1e-4 * weight.norm());
   EXPECT_LT((aided.noise().legs - legs.cwiseSqrt()).norm(), 1e-4 * legs.cwiseSqrt().norm());
 }

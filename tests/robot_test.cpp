@@ -9,6 +9,7 @@
 #include "support/robots.hpp"
 #include "support/trees.hpp"
 #include "ves/planning/joint_paths.hpp"
+#include "ves/robot/momentum.hpp"
 #include "ves/robot/newton_euler.hpp"
 
 namespace ves {
@@ -73,6 +74,19 @@ TEST_P(MovingBase, WrenchIsTheRateOfMomentum) {  // Appendix A with link 0 and a
       const Wrench F_Io_I = transfer(P.X * X_PL0, F_L0o_L0);
       ASSERT_LT((F_Io_I.stacked() - rate).norm(), 1e-9 * (1.0 + rate.norm()));
     }
+  }
+}
+
+TEST_P(MovingBase, JointsHaveTheMomentumOfTheirLinks) {  // on a base at rest
+  const std::string name = GetParam();
+  const RobotModel robot = name == "skew" ? skewRobot() : test::robot(name).model;
+  for (double t = 0.3; t < 4.0; t += 0.7) {
+    const Vec6 should = test::momentum(
+        robot, [](double) { return Transform(); },
+        [&](double at) { return jointSwing(robot.joints, at).q; }, t, 1e-2);
+    const JointState joints = jointSwing(robot.joints, t);
+    ASSERT_LT((jointMomentum(robot, joints.q, joints.q_dot) - should).norm(),
+              1e-9 * (1.0 + should.norm()));
   }
 }
 

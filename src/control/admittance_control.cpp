@@ -49,7 +49,8 @@ const PathPoint<6>& AdmittanceControl::step(const AdmittanceInput& in, const Vec
     change_.advance(model_);
     const double damping = energy_.damping() + change_.damping();
     if (inertia_)
-      model_.step(in.F_Po_I, in.M_1, since, in.wrench.age + in.share * wrench_delay_, damping);
+      model_.step(in.F_Po_I, {in.M_1_before, in.M_1}, since,
+                  in.wrench.age + in.share * wrench_delay_, damping);
     else
       model_.step(in.F_Po_I, damping);
     slowInsideEnvelope(last, in.L, checks);

@@ -156,6 +156,16 @@ ModalDynamics::Vector<kMaxModes> ModalDynamics::acceleration(const Body& body, c
   return eta_ddot;
 }
 
+ModalDynamics::Vector<kMaxModes> ModalDynamics::afterBlow(const Body& body,
+                                                          const Vector<kMaxModes>& eta_dot,
+                                                          const Vec6& blow) const noexcept {
+  Vector<kMaxModes> change;
+  change.noalias() = Phi_.transpose() * blow;
+  const Vec6 pull = body.pull * change;
+  change.noalias() -= Phi_.transpose() * pull;
+  return eta_dot + change;
+}
+
 ModalDynamics::Modes ModalDynamics::advance(const Body& body, double dt, const Modes& from,
                                             const Forces& u) const noexcept {
   // A body only slows the modes down: steps that suffice without it do.
@@ -219,10 +229,12 @@ void AdmittanceModel::reset(const Vec6& x, const Mat6& M_1, double ahead) noexce
   offset_.noalias() -= Phi * modes.eta;
   now_.motion = {};
   now_.motion.x = x;
+  E_.setIdentity();
   if (!(ahead > 0.0)) return;
+  E_ = angleRateMap(x.tail<3>());
   const ModalDynamics light = dynamics_.withoutDampingAbove(kMostGrowth / ahead);
   const ModalDynamics::Forces none = ModalDynamics::Forces::Zero(dynamics_.size());
-  modes = light.advance(light.body(M_1 / factors_.mass), -ahead, modes, none);
+  modes = light.advance(light.body(working(M_1) / factors_.mass), -ahead, modes, none);
 }
 
 void AdmittanceModel::step(const Wrench& F_Po_I, double damping) noexcept {
@@ -244,13 +256,23 @@ void AdmittanceModel::step(const Wrench& F_Po_I, double damping) noexcept {
   }
 }
 
-void AdmittanceModel::step(const Wrench& F_Po_I, const Mat6& M_1, double dt, double ahead,
+void AdmittanceModel::step(const Wrench& F_Po_I, const Carried& carried, double dt, double ahead,
                            double damping) noexcept {
-  const Mat6 M_1_per_mass = M_1 / factors_.mass;
-  const ModalDynamics::Body body = dynamics_.body(M_1_per_mass);
   before_ = now_;
+  // What the body's momentum loses by another shape or attitude goes to base and body. The moment
+  // of a body that slides is not in it: r' x v is no torque about a point that slides along.
+  Vec6 lost = carried.before.rightCols<3>() * (E_ * angleRates(before_.modes));
+  Modes middle = before_.modes;
+  middle.eta += 0.5 * dt * middle.eta_dot;
+  E_ = angleRateMap(coordinates(middle).tail<3>());
+  lost -= carried.M_1.rightCols<3>() * (E_ * angleRates(before_.modes));
+  const Mat6 M_1_per_mass = working(carried.M_1) / factors_.mass;
+  const ModalDynamics::Body body = dynamics_.body(M_1_per_mass);
+  before_.modes.eta_dot =
+      dynamics_.afterBlow(body, before_.modes.eta_dot, working(Wrench::from(lost)) / factors_.mass);
+
   ModalDynamics::Forces u;
-  u.noalias() = dynamics_.Phi().transpose() * F_Po_I.stacked();
+  u.noalias() = dynamics_.Phi().transpose() * working(F_Po_I);
   u /= factors_.mass;
   const Vec6 momentum = M_1_per_mass * (dynamics_.Phi() * before_.modes.eta_dot);
   damping_ = -damping * before_.modes.eta_dot;
@@ -261,16 +283,32 @@ void AdmittanceModel::step(const Wrench& F_Po_I, const Mat6& M_1, double dt, dou
   now_.motion = at(later, dynamics_.acceleration(body, later, u));
   if (damped() < 0.0) {
     now_ = before_;
-    step(F_Po_I, M_1, dt, ahead, 0.0);
+    step(F_Po_I, carried.M_1, dt, ahead, 0.0);
   }
+}
+
+Vec6 AdmittanceModel::coordinates(const Modes& modes) const noexcept {
+  Vec6 x = offset_;
+  x.noalias() += dynamics_.Phi() * modes.eta;
+  return x;
+}
+
+Vec3 AdmittanceModel::angleRates(const Modes& modes) const noexcept {
+  return dynamics_.Phi().bottomRows<3>() * modes.eta_dot;
+}
+
+Mat6 AdmittanceModel::working(const Mat6& M_1) const noexcept {
+  Mat6 out = M_1;
+  out.rightCols<3>() = M_1.rightCols<3>() * E_;
+  out.bottomRows<3>() = (E_.transpose() * out.bottomRows<3>()).eval();
+  return out;
 }
 
 PathPoint<6> AdmittanceModel::at(
     const Modes& modes, const ModalDynamics::Vector<kMaxModes>& acceleration) const noexcept {
   const auto& Phi = dynamics_.Phi();
   PathPoint<6> out;
-  out.x = offset_;
-  out.x.noalias() += Phi * modes.eta;
+  out.x = coordinates(modes);
   out.x_dot.noalias() = Phi * modes.eta_dot;
   out.x_ddot.noalias() = Phi * acceleration;
   return out;

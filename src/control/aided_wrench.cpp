@@ -5,72 +5,8 @@
 #include <cmath>
 
 #include "ves/math/dense.hpp"
-#include "ves/robot/newton_euler.hpp"
 
 namespace ves {
-
-JointReaction::JointReaction(const ControllerConfig& config)
-    : window_(config.servo.sensor_window),
-      delay_(config.servo.sensor_delay),
-      filter_(config.servo.sensor_cutoff) {}
-
-Wrench JointReaction::update(const KnownPayload& known, const Sample& sample,
-                             const Vec3& w_IP_P) noexcept {
-  if (known_ > 0 && sample.joints_time < last_[2].time) known_ = 0;
-  if (known_ > 0 && sample.joints_time == last_[2].time) return newest(sample.wrench_time);
-  std::rotate(last_.begin(), last_.begin() + 1, last_.end());
-  last_[2] = {sample.joints_time, sample.q, w_IP_P};
-  if (known_ < 3 && ++known_ < 3) {
-    filter_.settle(Eigen::Array<double, 6, 1>::Zero());
-    input_.setZero();
-    rate_.setZero();
-    return {};
-  }
-  const auto seconds = [](std::int64_t from, std::int64_t to) {
-    return static_cast<double>(to - from) * kSecondPerNanosecond;
-  };
-  const double T_0 = seconds(last_[0].time, last_[1].time),
-               T_1 = seconds(last_[1].time, last_[2].time);
-  const JointVector rate_0 = (last_[1].q - last_[0].q) / T_0,
-                    rate_1 = (last_[2].q - last_[1].q) / T_1;
-  JointState joints;
-  joints.q = last_[1].q;
-  joints.q_dot = (T_0 * rate_1 + T_1 * rate_0) / (T_0 + T_1);
-  joints.q_ddot = 2.0 / (T_0 + T_1) * (rate_1 - rate_0);
-  const Vec6 before = input_;
-  input_ = reaction(known, joints, last_[1].w_IP_P);
-  rate_ = (input_ - before) / T_0;
-  filter_.advance(filter_.prepare(T_0), input_.array());
-  return newest(sample.wrench_time);
-}
-
-Wrench JointReaction::newest(std::int64_t time) const noexcept {
-  if (known_ < 3) return {};
-  const double ahead =
-      std::max(0.0, static_cast<double>(time - last_[1].time) * kSecondPerNanosecond);
-  if (!(ahead > 0.0)) return Wrench::from(filter_.output().matrix());
-  Butterworth2<6> now = filter_;
-  now.advance(now.prepare(ahead), (input_ + ahead * rate_).array());
-  const Vec6 y_1 = now.output(), rate = now.rate();
-  if (!(window_ > 0.0)) return Wrench::from(y_1 - delay_ * rate);
-  // Over the window, or as much of it as is ahead.
-  Butterworth2<6> begin = filter_;
-  const double before = ahead - window_;
-  if (before > 0.0) begin.advance(begin.prepare(before), (input_ + before * rate_).array());
-  const Vec6 y_0 = begin.output();
-  return Wrench::from(0.5 * (y_0 + y_1) - delay_ / std::min(ahead, window_) * (y_1 - y_0));
-}
-
-/// F_Po_P on the platform. What it takes to accelerate the locked robot is RobotInertia's.
-Vec6 JointReaction::reaction(const KnownPayload& known, const JointState& joints,
-                             const Vec3& w_IP_P) noexcept {
-  BodyMotion P;
-  P.w = w_IP_P;
-  const Transform X_PL0 = known.payload().X_PL0();
-  const Wrench on_robot =
-      newtonEuler(known.carried(), joints, properMotion(P, X_PL0, Vec3::Zero())).F_L0o_L0;
-  return -transfer(X_PL0, on_robot).stacked();
-}
 
 double largestFelt(const ServoModel& servo, double period, std::size_t samples) {
   // The mean of what steps make, later by a period each, is what their mean makes; a mean over the
@@ -140,30 +76,27 @@ AidedWrench::AidedWrench(const ControllerConfig& config)
                           .cwiseProduct(config.servo.readings.scale)),
       X_SP_(inverse(config.sensor.X_PS)),
       S_proc_(inverse(config.sensor.C_proc)),
-      joints_(config),
       gate_(config) {}
 
 Wrench AidedWrench::update(const Input& in, bool engaged) noexcept {
   if (!aided_) return in.measured;
   if (!engaged) {
-    joints_.reset();
     gate_.reset();
     residuals_ = 0;
     reaction_ = {};
     withholds_ = false;
     return in.measured;
   }
-  if (in.samples.fresh())
-    F_Po_P_ = joints_.update(in.known, in.samples.sample(), in.X_IP.R.transpose() * in.w_IP_I);
-  reaction_ = rotate(in.X_IP.R, F_Po_P_);
-  const Wrench residual = in.measured - reaction_;
+  reaction_ = in.joints.force();
   if (!in.bias.calibrated()) return in.measured;
   if (in.samples.fresh()) {
     constexpr std::int64_t kRefresh = 100;  // [-] samples: attitude and joints change slowly
     if (residuals_++ % kRefresh == 0) refreshNoise(in);
+    const Wrench residual = in.measured - in.joints.shown(in.w_IP_I);
     withholds_ = !gate_.open(countsOf(residual, in.X_IP.R), noise_);
   }
-  return withholds_ ? in.measured + Wrench::from(-in.share * residual.stacked()) : in.measured;
+  if (!withholds_) return in.measured;
+  return in.measured + Wrench::from(in.share * (reaction_ - in.measured).stacked());
 }
 
 /// What the sensor reads of a wrench.

@@ -67,23 +67,31 @@ RobotInertia::RobotInertia(const ControllerConfig& config)
       geometry_(config.geometry) {}
 
 Wrench RobotInertia::update(const KnownPayload& known, std::int64_t count, const JointVector& q,
-                            const Transform& X_IP, const LegMotion& legs, bool engaged,
-                            double share) noexcept {
+                            double since, const Transform& X_IP, const LegMotion& legs,
+                            bool engaged, double share) noexcept {
   if (!compensated_ || !engaged) {
     known_ = false;
     w_IP_I_.setZero();
     return {};
   }
-  if (!known_ || count % mass_update_ == 0 || known.changed())
+  const bool first = !known_ || known.changed();
+  if (first || count % mass_update_ == 0)
     composite_P_ = combine(RigidBody{}, known.payload().X_PL0(), compositeBody(known.carried(), q));
   known_ = true;
-  M_1_ = share * scale_ * spatialMass(rotated(X_IP.R, composite_P_));
+  if (first || since > 0.0) {
+    whole_before_ = whole_;
+    whole_ = scale_ * spatialMass(rotated(X_IP.R, composite_P_));
+    if (first) whole_before_ = whole_;
+    since_ = since;
+  }
+  M_1_ = share * whole_;
+  before_ = share * whole_before_;
   BodyMotion P;
   if (!forwardMotion(geometry_, X_IP, legs, P)) return {};
   w_IP_I_ = P.w;
-  Vec6 acceleration;
-  acceleration << P.a, P.alpha;
-  return Wrench::from(M_1_ * acceleration);
+  Vec6 momentum_rate = M_1_ * (Vec6() << P.a, P.alpha).finished();
+  if (since_ > 0.0) momentum_rate += (M_1_ - before_).rightCols<3>() * P.w / since_;
+  return Wrench::from(momentum_rate);
 }
 
 }  // namespace ves

@@ -14,6 +14,7 @@ TestPlatform::TestPlatform(const ControllerConfig& config)
       known_(config),
       load_(config),
       bias_(config),
+      joints_(config),
       robot_(config),
       aided_(config),
       filter_(config.wrench_filter, period_),
@@ -40,10 +41,12 @@ const TickState& TestPlatform::tick(const TickInput& in) noexcept {
   Wrenches W;
   W.total = forceMeasurement(config_.sensor, bias_.counts(), sample.adc, X_IP.R);  // (C.1)
   W.static_wrench = gravityCompensation(config_.payload, X_IP.R, load_.wrench());  // (B.4)
-  W.inertial = robot_.update(known_, elapsed.count, sample.q, X_IP, legs_.feltMotion(), engaged,
-                             share_.value());
+  if (!engaged) joints_.reset(sample.q);
+  joints_.update(known_, sample, X_IP.R, engaged ? samples_.wrench().since : 0.0);
+  W.inertial = robot_.update(known_, elapsed.count, joints_.q(), samples_.wrench().since, X_IP,
+                             legs_.feltMotion(), engaged, share_.value());
   const Wrench measured = W.total - W.static_wrench + W.inertial;
-  W.felt = aided_.update({measured, W.static_wrench, robot_.M_1(), robot_.w_IP_I(), known_,
+  W.felt = aided_.update({measured, W.static_wrench, robot_.M_1(), robot_.w_IP_I(), joints_,
                           samples_, bias_, X_IP, share_.value()},
                          engaged);
   if (!engaged) filter_.reset();
@@ -84,8 +87,8 @@ Waypoint<6> TestPlatform::nextMotion(const Wrenches& W) noexcept {
     bias_.calibrate(sample, samples_.fresh(), load_.counts());
   if (supervisor_.runs(motion_, SegmentKind::kAdmittance))
     return motion_.admittanceModel(
-        {W.dynamic, W.felt, robot_.M_1(), share_.value(), samples_.wrench(), sample.q,
-         commander_.legs().L, legs_.measured().X_IP, legs_.servo()},
+        {W.dynamic, W.felt, robot_.M_1(), robot_.before(), share_.value(), samples_.wrench(),
+         sample.q, commander_.legs().L, legs_.measured().X_IP, legs_.servo()},
         safety_.path());
   if (supervisor_.moves()) return motion_.trajectoryGeneration();
   // Until the legs follow, they are where they are measured.

@@ -77,6 +77,9 @@ class ModalDynamics {
     Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, kMaxModes> pull;  // wrench per -eta''(free)
   };
   Body body(const Mat6& M_1) const noexcept;
+  /// eta' of base and body after a blow at Po in I [N s, N m s], of a base of mass 1.
+  Vector<kMaxModes> afterBlow(const Body& body, const Vector<kMaxModes>& eta_dot,
+                              const Vec6& blow) const noexcept;
   /// From `from` over dt [s], which may be negative, with the body, `u` held. To rounding: the
   /// exponential's Taylor series, in as many steps as the fastest mode takes.
   Modes advance(const Body& body, double dt, const Modes& from, const Forces& u) const noexcept;
@@ -110,8 +113,10 @@ class ModalDynamics {
   Square damping_;  // when coupled
 };
 
-/// Steps a modal model by the exact zero-order hold. Coordinates are those of Pose about home,
-/// taken as small: the wrench's moments drive the fixed angles directly, as in (C.2).
+/// Steps a modal model by the exact zero-order hold. Coordinates are those of Pose about home.
+/// Without a body they are taken as small: the wrench's moments drive the fixed angles directly, as
+/// in (C.2). With one, moments do their work on them, and rates are those of the body, however far
+/// it turns.
 ///
 /// Its mass m, damping c and stiffness k may be changed, all modes alike: m eta'' + c C eta' + k K
 /// eta = Phi^T W.
@@ -130,10 +135,18 @@ class AdmittanceModel {
   /// held with W; not in a step in which the vehicle turns round, and it would push.
   void step(const Wrench& F_Po_I, double damping = 0.0) noexcept;
 
-  /// The same `dt` [s] after, with a rigid body M_1 on the base whose inertia is not in F_Po_I:
-  /// the left-hand side of (3.11). motion() is `ahead` [s] of that, F_Po_I held. dt of 0: F_Po_I
-  /// has acted already.
-  void step(const Wrench& F_Po_I, const Mat6& M_1, double dt, double ahead,
+  /// A rigid body on the base, about Po in I, whose inertia is not in F_Po_I.
+  struct Carried {
+    Carried(const Mat6& M_1_before, const Mat6& M_1_now) : before(M_1_before), M_1(M_1_now) {}
+    Carried(const Mat6& kept) : Carried(kept, kept) {}
+
+    Mat6 before;  // in the step before
+    Mat6 M_1;
+  };
+  /// The same `dt` [s] after, with a rigid body on the base: the left-hand side of (3.11), where
+  /// the body changes as that of momenta: what it turns with is passed on. motion() is `ahead` [s]
+  /// of that, F_Po_I held. dt of 0: F_Po_I has acted already.
+  void step(const Wrench& F_Po_I, const Carried& body, double dt, double ahead,
             double damping = 0.0) noexcept;
 
   /// Takes back all but `share` of the last step, and of the rate it led to: all modes alike, so
@@ -160,7 +173,7 @@ class AdmittanceModel {
 
   /// [J] that the last step took of F_Po_I, and that its damping took.
   double taken(const Wrench& F_Po_I) const noexcept {
-    return F_Po_I.stacked().dot(dynamics_.Phi() * (now_.modes.eta - before_.modes.eta));
+    return working(F_Po_I).dot(dynamics_.Phi() * (now_.modes.eta - before_.modes.eta));
   }
   double damped() const noexcept {
     return -factors_.mass * damping_.dot(now_.modes.eta - before_.modes.eta);
@@ -180,6 +193,13 @@ class AdmittanceModel {
     PathPoint<6> motion;
   };
 
+  Vec6 coordinates(const Modes& modes) const noexcept;
+  Vec3 angleRates(const Modes& modes) const noexcept;  // [rad/s]
+  /// On the coordinates, stacked.
+  Vec6 working(const Wrench& F_Po_I) const noexcept {
+    return (Vec6() << F_Po_I.f, E_.transpose() * F_Po_I.n).finished();
+  }
+  Mat6 working(const Mat6& M_1) const noexcept;
   PathPoint<6> at(const Modes& modes,
                   const ModalDynamics::Vector<kMaxModes>& acceleration) const noexcept;
 
@@ -191,6 +211,7 @@ class AdmittanceModel {
   Hold step_;
   State now_, before_;             // before the last step
   ModalDynamics::Forces damping_;  // in the last step, per mass
+  Mat3 E_ = Mat3::Identity();      // angleRateMap amid the last step; none without a body
   Vec6 offset_ = Vec6::Zero();
 };
 

@@ -4,44 +4,10 @@
 // and of what the sensor shows beyond that only significant residuals pass. Beyond the report.
 #pragma once
 
-#include "ves/control/robot_load.hpp"
+#include "ves/control/joint_momentum.hpp"
 #include "ves/control/sensor_bias.hpp"
 
 namespace ves {
-
-/// The wrench of the robot's joints in motion, on a base that turns but does not accelerate, behind
-/// the sensor's filter and mean: Newton-Euler (Appendix A) with rates and accelerations by divided
-/// differences of the last three angles. These hold where the middle one was read; from there the
-/// wrench is extrapolated along a line to where the newest sample was taken.
-class JointReaction {
- public:
-  explicit JointReaction(const ControllerConfig& config);
-
-  /// Nothing is known of the past.
-  void reset() noexcept { known_ = 0; }
-  /// A new sample, taken while the platform turned at w_IP_P. F_Po_P as its wrench shows it; zero
-  /// until three angles have come. A driver of the joints may be slower than the tick: then the
-  /// last angles still hold.
-  Wrench update(const KnownPayload& known, const Sample& sample, const Vec3& w_IP_P) noexcept;
-
- private:
-  struct Angles {
-    std::int64_t time = 0;  // [ns]
-    JointVector q = JointVector::Zero();
-    Vec3 w_IP_P = Vec3::Zero();  // [rad/s] of the platform then
-  };
-  /// Brought to `time` [ns]; zero while too little is known.
-  Wrench newest(std::int64_t time) const noexcept;
-  static Vec6 reaction(const KnownPayload& known, const JointState& joints,
-                       const Vec3& w_IP_P) noexcept;
-
-  double window_, delay_;  // [s] of the sensor, ServoModel
-  Butterworth2<6> filter_;
-  std::array<Angles, 3> last_{};  // the oldest first
-  int known_ = 0;                 // [-] of them
-  Vec6 input_ = Vec6::Zero();     // [N, N m] of the filter, at the middle one
-  Vec6 rate_ = Vec6::Zero();      // [N/s, N m/s] of it there
-};
 
 /// [1/s] The largest mean over so many samples, a period apart, of the acceleration that the wrench
 /// shows of a leg whose v_end steps by 1 m/s.
@@ -89,7 +55,7 @@ class AidedWrench {
     const Wrench& weight;    // F_Po_I
     const Mat6& M_1;         // RobotInertia
     const Vec3& w_IP_I;      // [rad/s] of the platform, when the newest sample was taken
-    const KnownPayload& known;
+    const JointMomentum& joints;
     const SampleStream& samples;
     const SensorBias& bias;
     const Transform& X_IP;
@@ -113,11 +79,10 @@ class AidedWrench {
   Vec6 speed_of_count_;  // [m/s] K times a count
   Transform X_SP_;
   Mat6 S_proc_;  // [count per N | N m]
-  JointReaction joints_;
   ResidualGate gate_;
   ResidualNoise noise_;
   std::int64_t residuals_ = 0;  // [-] so far
-  Wrench F_Po_P_, reaction_;
+  Wrench reaction_;
   bool withholds_ = false;
 };
 

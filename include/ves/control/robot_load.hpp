@@ -65,19 +65,22 @@ class StaticLoad {
   Wrench F_So_S_;
 };
 
-/// The robot's inertia as the platform moves, its joints taken as locked.
+/// The robot's inertia as the platform moves: what changes the momentum of its composite body.
 class RobotInertia {
  public:
   explicit RobotInertia(const ControllerConfig& config);
 
-  /// F_Po_I that it takes to move the composite body; zero when that is not compensated, or before
-  /// the legs are `engaged`. `count` [-] of the tick; `legs` with the accelerations that the
-  /// wrench shows; `share` [-] of the compensation that is in.
-  Wrench update(const KnownPayload& known, std::int64_t count, const JointVector& q,
+  /// F_Po_I that it takes to move the composite body, and to turn it while the joints change it;
+  /// zero when that is not compensated, or before the legs are `engaged`. `count` [-] of the tick;
+  /// joints at q as the wrench shows them, `since` [s] after the time before; `legs` with the
+  /// accelerations that the wrench shows; `share` [-] of the compensation that is in.
+  Wrench update(const KnownPayload& known, std::int64_t count, const JointVector& q, double since,
                 const Transform& X_IP, const LegMotion& legs, bool engaged, double share) noexcept;
 
   /// Of the composite body about Po in I, times the share. [kg, kg m, kg m^2]
   const Mat6& M_1() const noexcept { return M_1_; }
+  /// The same before the newest sample, the share as now.
+  const Mat6& before() const noexcept { return before_; }
   /// Of the platform, when the newest sample was taken; zero where it is not looked at.
   const Vec3& w_IP_I() const noexcept { return w_IP_I_; }  // [rad/s]
 
@@ -87,8 +90,11 @@ class RobotInertia {
   double scale_;     // [-] of it that the wrench shows
   Geometry geometry_;
   RigidBody composite_P_;
-  bool known_ = false;  // composite_P_, since the legs were engaged
-  Mat6 M_1_ = Mat6::Zero();
+  bool known_ = false;         // composite_P_, since the legs were engaged
+  Mat6 whole_ = Mat6::Zero();  // M_1 of all of it
+  Mat6 whole_before_ = Mat6::Zero();
+  double since_ = 0.0;  // [s] between the two
+  Mat6 M_1_ = Mat6::Zero(), before_ = Mat6::Zero();
   Vec3 w_IP_I_ = Vec3::Zero();
 };
 

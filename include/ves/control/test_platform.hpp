@@ -59,6 +59,7 @@ class TestPlatform {
   KnownPayload known_;
   StaticLoad load_;
   SensorBias bias_;
+  JointMomentum joints_;
   RobotInertia robot_;
   AidedWrench aided_;
   WrenchFilter filter_;

@@ -46,8 +46,28 @@ class Butterworth2 {
   }
   void advance(const Step& step, const Channels& u) noexcept { advance(step, u, Channels::Zero()); }
 
+  /// The input runs to u along a parabola of the second derivative `curve`.
+  void advanceAlong(const Step& step, const Channels& u, const Channels& curve) noexcept {
+    const Channels chord = (u - u_) / step.dt, bend = 0.5 * step.dt * curve;
+    // Its own response is u - sqrt(2)/w u' + u''/w^2.
+    const auto response = [&](const Channels& at, const Channels& slope) -> Channels {
+      return at - M_SQRT2 / w_ * slope + curve / (w_ * w_);
+    };
+    const Channels slope = chord + bend, late = M_SQRT2 / w_ * curve;
+    const Channels e = y_ - response(u_, chord - bend), e_dot = y_dot_ - (chord - bend - late);
+    y_ = response(u, slope) + step.Phi(0, 0) * e + step.Phi(0, 1) * e_dot;
+    y_dot_ = slope - late + step.Phi(1, 0) * e + step.Phi(1, 1) * e_dot;
+    u_ = u;
+  }
+
   /// The input changes at once: the next step's is constant when it ends at u too.
   void jump(const Channels& u) noexcept { u_ = u; }
+
+  /// As if everything so far had been so much more.
+  void raise(const Channels& by) noexcept {
+    u_ += by;
+    y_ += by;
+  }
 
   const Channels& output() const noexcept { return y_; }
   const Channels& rate() const noexcept { return y_dot_; }  // of the output

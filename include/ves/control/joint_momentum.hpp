@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// The robot's joints as the newest wrench shows them, and the wrench that they make: what their
+// momentum changes by. Beyond the report.
+#pragma once
+
+#include "ves/control/robot_load.hpp"
+
+namespace ves {
+
+/// The joints' angles and their momentum behind the sensor's filter and delay.
+class JointMomentum {
+ public:
+  explicit JointMomentum(const ControllerConfig& config);
+
+  /// Nothing is known of the past; joints at q.
+  void reset(const JointVector& q) noexcept;
+  /// A tick; its sample `since` [s] after the one before (0: there is no new one), taken with the
+  /// platform turned by R_IP. What `known` newly knows counts as carried before.
+  void update(const KnownPayload& known, const Sample& sample, const Mat3& R_IP,
+              double since) noexcept;
+
+  const JointVector& q() const noexcept { return q_; }  // [rad | m] as the wrench shows them
+  /// F_Po_I of the joints on a base at rest: what the momentum has lost since the sample before,
+  /// per second. Its sum over time loses nothing. Zero where only inertia is compensated.
+  const Wrench& force() const noexcept { return force_; }
+  /// F_Po_I that a platform turning at w_IP_I shows of it in the sensor's mean, beyond what
+  /// RobotInertia counts.
+  Wrench shown(const Vec3& w_IP_I) const noexcept;
+
+ private:
+  struct Angles {
+    std::int64_t time = 0;  // [ns]
+    JointVector q = JointVector::Zero();
+  };
+  using Filter = Butterworth2<kMaxJoints + 6>;  // of angles and momentum
+  using Channels = Filter::Channels;
+
+  void addMiddle(const KnownPayload& known, bool first) noexcept;
+  Channels filtered(std::int64_t time) const noexcept;
+  Vec6 momentum(const Channels& filtered) const noexcept;
+
+  bool aided_;
+  std::int64_t delay_;            // [ns] of the sensor, ServoModel
+  std::int64_t begin_, end_;      // [ns] of what it shows, after the wrench
+  Filter filter_, before_;        // at the middle one of the angles, and at the oldest
+  std::array<Angles, 3> last_{};  // the oldest first
+  int known_ = 0;                 // [-] of them
+  // At the middle one, not filtered.
+  JointVector q_dot_ = JointVector::Zero(), q_ddot_ = JointVector::Zero();
+  Channels input_ = Channels::Zero(), rate_ = Channels::Zero(), curve_ = Channels::Zero();
+  Channels chord_ = Channels::Zero();  // rate from the one before to it
+  JointVector q_ = JointVector::Zero();
+  Transform X_PL0_;
+  Mat3 R_IP_ = Mat3::Identity();
+  bool begun_ = false;            // there is a sample before
+  Vec6 shown_ = Vec6::Zero();     // [N, N m] in I, R_IP held
+  Vec6 mean_ = Vec6::Zero();      // [N s, N m s] about Po in I, in the sensor's mean
+  Vec6 momentum_ = Vec6::Zero();  // at the newest wrench
+  Wrench force_;
+};
+
+}  // namespace ves

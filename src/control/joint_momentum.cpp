@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/control/joint_momentum.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "ves/robot/momentum.hpp"
+
+namespace ves {
+namespace {
+
+double seconds(std::int64_t from, std::int64_t to) {
+  return static_cast<double>(to - from) * kSecondPerNanosecond;
+}
+
+}  // namespace
+
+JointMomentum::JointMomentum(const ControllerConfig& config)
+    : aided_(config.compensation.aided),
+      delay_(std::llround(config.servo.sensor_delay * 1e9)),
+      filter_(config.servo.sensor_cutoff),
+      before_(filter_) {
+  constexpr std::int64_t kInstant = 1'000'000;  // [ns] in which a rate hardly changes
+  const std::int64_t window = std::llround(config.servo.sensor_window * 1e9);
+  begin_ = window > 0 ? -window : -kInstant / 2;
+  end_ = window > 0 ? 0 : kInstant / 2;
+}
+
+void JointMomentum::reset(const JointVector& q) noexcept {
+  known_ = 0;
+  begun_ = false;
+  q_ = q;
+  force_ = {};
+}
+
+void JointMomentum::update(const KnownPayload& known, const Sample& sample, const Mat3& R_IP,
+                           double since) noexcept {
+  if (known.changed() && known_ == 3 && aided_) {
+    const Vec6 taken =
+        jointMomentum(known.carried(), last_[1].q, q_dot_) - input_.tail<6>().matrix();
+    Channels change = Channels::Zero();
+    change.tail<6>() = taken.array();
+    input_ += change;
+    filter_.raise(change);
+    before_.raise(change);
+    momentum_ += momentum(change);
+  }
+  if (!(since > 0.0)) return;
+  if (known_ > 0 && sample.joints_time < last_[2].time) reset(sample.q);
+  if (known_ == 0 || sample.joints_time > last_[2].time) {
+    std::rotate(last_.begin(), last_.begin() + 1, last_.end());
+    last_[2] = {sample.joints_time, sample.q};
+    const bool first = known_ < 3;
+    if (first) ++known_;
+    if (known_ == 3) addMiddle(known, first);
+  }
+  q_ = sample.q;
+  if (known_ < 3) return;
+  const std::int64_t time = sample.wrench_time - delay_;
+  const Channels now = filtered(time);
+  q_ = now.head<kMaxJoints>().matrix();
+  if (!aided_) return;
+  X_PL0_ = known.payload().X_PL0();
+  R_IP_ = R_IP;
+  const Vec6 before = momentum_, begin = momentum(filtered(time + begin_)),
+             end = momentum(filtered(time + end_));
+  momentum_ = momentum(now);
+  force_ = begun_ ? Wrench::from((before - momentum_) / since) : Wrench{};
+  begun_ = true;
+  shown_ = (begin - end) / seconds(begin_, end_);
+  mean_ = 0.5 * (begin + end);
+}
+
+Wrench JointMomentum::shown(const Vec3& w_IP_I) const noexcept {
+  if (!begun_) return {};
+  return Wrench::from(shown_) -
+         Wrench{w_IP_I.cross(mean_.head<3>()), w_IP_I.cross(mean_.tail<3>())};
+}
+
+/// Divided differences of the three angles: they hold where the middle one was read.
+void JointMomentum::addMiddle(const KnownPayload& known, bool first) noexcept {
+  const double T_0 = seconds(last_[0].time, last_[1].time),
+               T_1 = seconds(last_[1].time, last_[2].time);
+  const JointVector rate_0 = (last_[1].q - last_[0].q) / T_0,
+                    rate_1 = (last_[2].q - last_[1].q) / T_1;
+  q_dot_ = (T_0 * rate_1 + T_1 * rate_0) / (T_0 + T_1);
+  q_ddot_ = 2.0 / (T_0 + T_1) * (rate_1 - rate_0);
+  const Channels before = input_;
+  input_.head<kMaxJoints>() = last_[1].q.array();
+  if (aided_) input_.tail<6>() = jointMomentum(known.carried(), last_[1].q, q_dot_).array();
+  before_ = filter_;
+  if (first) {
+    filter_.settle(input_);
+    before_ = filter_;
+    chord_ = curve_ = rate_ = Channels::Zero();
+  } else {
+    const Channels chord = (input_ - before) / T_0;
+    curve_ = (chord - chord_) / T_0;
+    curve_.head<kMaxJoints>() = q_ddot_.array();
+    rate_ = chord + 0.5 * T_0 * curve_;
+    chord_ = chord;
+    filter_.advanceAlong(filter_.prepare(T_0), input_, curve_);
+  }
+  rate_.head<kMaxJoints>() = q_dot_.array();
+}
+
+/// What is filtered runs along parabolas.
+JointMomentum::Channels JointMomentum::filtered(std::int64_t time) const noexcept {
+  const double ahead = seconds(last_[1].time, time);
+  const Channels input = input_ + ahead * rate_ + 0.5 * ahead * ahead * curve_;
+  Filter at = filter_;
+  if (ahead > 0.0) {
+    at.advanceAlong(at.prepare(ahead), input, curve_);
+  } else if (const double since = seconds(last_[0].time, time); since > 0.0) {
+    at = before_;
+    at.advanceAlong(at.prepare(since), input, curve_);
+  }
+  return at.output();
+}
+
+/// About Po in I.
+Vec6 JointMomentum::momentum(const Channels& filtered) const noexcept {
+  const Wrench of_L0 = Wrench::from(filtered.tail<6>().matrix());
+  return rotate(R_IP_, transfer(X_PL0_, of_L0)).stacked();
+}
+
+}  // namespace ves
