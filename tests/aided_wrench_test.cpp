@@ -211,58 +211,45 @@ ResidualNoise noiseOfFive() {
   return n;
 }
 
-TEST(ResidualGate, NoiseStaysOutside) {
-  const ControllerConfig c = config();
-  std::mt19937 random(7);
-  std::normal_distribution<double> normal(0.0, 5.0);
-  ResidualGate gate(c);
-  int open = 0;
-  constexpr int kSamples = 20'000;
-  for (int k = 0; k < kSamples; ++k)
-    open += gate.open(Vec6::NullaryExpr([&] { return normal(random); }), noiseOfFive());
-  // 6.8e-6 a channel, sample and mean, open for ten samples each.
-  EXPECT_LE(open, 120);
+/// Index of a mean over so many samples.
+std::size_t over(int samples) {
+  for (std::size_t i = 0; i < ResidualGate::kMeans.size(); ++i)
+    if (ResidualGate::kMeans[i] == samples) return i;
+  ADD_FAILURE() << samples;
+  return 0;
 }
 
-TEST(ResidualGate, OpensAtOnceForWhatIsLargeAndLaterForWhatIsSmall) {
-  const ControllerConfig c = config();
-  const auto samplesUntilOpen = [&](double residual, int channel) {
-    ResidualGate gate(c);
-    for (int k = 0; k < 50; ++k) gate.open(Vec6::Zero(), noiseOfFive());
-    for (int k = 1; k <= 500; ++k)
-      if (gate.open(residual * Vec6::Unit(channel), noiseOfFive())) return k;
-    return 0;
+TEST(ResidualGate, PassesWhatIsMoreThanNoiseAndWhatIsNotKnown) {
+  const ResidualGate gate(config());
+  const auto exceeds = [&](int samples, double mean, double unknown, int channel) {
+    return gate.exceeds(over(samples), mean * Vec6::Unit(channel), noiseOfFive(),
+                        Vec6::Constant(unknown));
   };
-  // Bounds: 4.5 * sqrt(25 / n + 25 / 100) for means of n.
-  EXPECT_EQ(samplesUntilOpen(22.7, 0), 1);
-  EXPECT_EQ(samplesUntilOpen(-22.7, 5), 1);
-  EXPECT_EQ(samplesUntilOpen(22.5, 0), 3);  // 10.31 of five
-  EXPECT_EQ(samplesUntilOpen(10.4, 2), 5);
-  EXPECT_EQ(samplesUntilOpen(10.2, 2), 20);  // 3.90 of fifty: 19.1 samples
-  EXPECT_EQ(samplesUntilOpen(3.95, 3), 50);
-  EXPECT_EQ(samplesUntilOpen(3.85, 3), 0);
-}
-
-TEST(ResidualGate, StaysOpenForATenthOfASecond) {
-  ResidualGate gate(config());
-  EXPECT_TRUE(gate.open(40.0 * Vec6::Unit(1), noiseOfFive()));  // the means see nothing of it
-  int open = 0;
-  while (gate.open(Vec6::Zero(), noiseOfFive()) && open < 100) ++open;
-  EXPECT_EQ(open, 9);  // and the tenth is the sample itself
+  // Bounds: 4.5 * sqrt(25 / n + unknown) for means of n.
+  for (const auto& [samples, unknown, most] :
+       {std::tuple{1, 0.0, 22.5}, std::tuple{1, 0.25, 22.612}, std::tuple{5, 0.25, 10.312},
+        std::tuple{20, 0.25, 5.511}, std::tuple{200, 0.25, 2.756}, std::tuple{200, 25.0, 22.556}})
+    for (const int channel : {0, 5}) {
+      EXPECT_FALSE(exceeds(samples, 0.999 * most, unknown, channel)) << samples;
+      EXPECT_FALSE(exceeds(samples, -0.999 * most, unknown, channel)) << samples;
+      EXPECT_TRUE(exceeds(samples, 1.001 * most, unknown, channel)) << samples;
+      EXPECT_TRUE(exceeds(samples, -1.001 * most, unknown, channel)) << samples;
+    }
 }
 
 TEST(ResidualGate, ANumberThatIsNonePasses) {  // so that the safety checks see it
-  ResidualGate gate(config());
+  const ResidualGate gate(config());
   Vec6 residual = Vec6::Zero();
   residual(4) = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_TRUE(gate.open(residual, noiseOfFive()));
+  for (std::size_t i = 0; i < ResidualGate::kMeans.size(); ++i)
+    EXPECT_TRUE(gate.exceeds(i, residual, noiseOfFive(), Vec6::Zero()));
 }
 
 TEST(ResidualGate, AllowsForTheLegsAndTheWeight) {
   const ControllerConfig c = config();
+  const ResidualGate gate(c);
   const auto passes = [&](double residual, const ResidualNoise& noise) {
-    ResidualGate gate(c);
-    return gate.open(residual * Vec6::Unit(0), noise);
+    return gate.exceeds(0, residual * Vec6::Unit(0), noise, Vec6::Constant(0.25));
   };
   ResidualNoise noise = noiseOfFive();
   noise.weight.setConstant(75.0);  // 4.5 sqrt(100.25)
@@ -335,8 +322,12 @@ TEST(AidedWrench, KnowsWhatRoundedLegsMakeOfWeightAndInertia) {
   }
   ASSERT_TRUE(bias.calibrated());
   const Wrench static_wrench = gravityCompensation(c.payload, X_IP.R, F_So_S);
-  aided.update({Wrench{}, static_wrench, M_1, Vec3::Zero(), joints, samples, bias, X_IP, 1.0},
-               true);
+  LegMotion standing;
+  standing.L = L;
+  RobotInertia inertia(c);
+  inertia.update(KnownPayload(c), 0, q, 0.0, X_IP, standing, true, 1.0);
+  joints.reset(q);
+  aided.update({Wrench{}, static_wrench, inertia, joints, samples, bias, X_IP, 1.0}, true);
   EXPECT_LT((aided.noise().weight - weight).norm(), 1e-4 * weight.norm());
   EXPECT_LT((aided.noise().legs - legs.cwiseSqrt()).norm(), 1e-4 * legs.cwiseSqrt().norm());
 }

@@ -119,6 +119,7 @@ TEST(Config, EveryMachineNumberIsTheReportsOrTagged) {
                                         "inertia",
                                         "adaptation",
                                         "wrench",
+                                        "learns_masses",
                                         "filters",
                                         "dead_band_n_or_nm",
                                         "low_pass_hz",
@@ -346,6 +347,10 @@ INSTANTIATE_TEST_SUITE_P(
             "controller.compensation.inertia: needs the observer, want 'observer: true'"},
         Bad{"adaptation_without_observer", "z_sine", "controller.compensation.adaptation=true",
             "controller.compensation.adaptation: needs the observer, want 'observer: true'"},
+        Bad{"learning_without_a_model", "z_sine", "controller.compensation.learns_masses=true",
+            "controller.compensation.learns_masses: needs the robot's model beside the sensor, "
+            "want "
+            "'wrench: aided'"},
         Bad{"aided_without_inertia", "z_sine", "controller.compensation.wrench=aided",
             "'aided' needs the robot's inertia taken out, want 'inertia: true'"},
         Bad{"wrench_choice", "z_sine", "controller.compensation.wrench=clean",

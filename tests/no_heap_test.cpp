@@ -24,7 +24,8 @@ TEST(MallocGuard, CountsAnAllocation) {  // the test that the others can fail
 constexpr const char* kCompensated =
     "controller.compensation={feed_forward: true, observer: true, inertia: true, "
     "mass_update_ticks: 3, ramp_s: 0.5, reading_jitter_s: 0.001, adaptation: true, "
-    "adaptation_limit: 1.25, forgetting_s: 60, wrench: aided, gate_deviations: 4.5, "
+    "adaptation_limit: 1.25, forgetting_s: 60, wrench: aided, learns_masses: true, "
+    "gate_deviations: 4.5, "
     "gate_hold_s: 0.1, timing_error_s: 0.0005, gain_error: 0.05, mass_error: 0.05}";
 
 class NoHeap : public testing::TestWithParam<const char*> {};

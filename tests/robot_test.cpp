@@ -9,6 +9,7 @@
 #include "support/robots.hpp"
 #include "support/trees.hpp"
 #include "ves/planning/joint_paths.hpp"
+#include "ves/robot/mass_regressor.hpp"
 #include "ves/robot/momentum.hpp"
 #include "ves/robot/newton_euler.hpp"
 
@@ -87,6 +88,40 @@ TEST_P(MovingBase, JointsHaveTheMomentumOfTheirLinks) {  // on a base at rest
     const JointState joints = jointSwing(robot.joints, t);
     ASSERT_LT((jointMomentum(robot, joints.q, joints.q_dot) - should).norm(),
               1e-9 * (1.0 + should.norm()));
+  }
+}
+
+// Wrong masses and centres: what the columns say of them is what another robot's momentum and
+// weight differ by.
+TEST_P(MovingBase, MassColumnsAreWhatARobotOfOtherMassesDiffersBy) {
+  const std::string name = GetParam();
+  const RobotModel robot = name == "skew" ? skewRobot() : test::robot(name).model;
+  const MassRegressor regressor(robot);
+  const Transform X_PL0{rotation({0.3, -0.2, 0.5}), Vec3(0.1, -0.3, 0.4)};
+  const Vec3 g_I(1.0, -2.0, -9.0);
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> some(-0.2, 0.2);
+  for (double t = 0.3; t < 4.0; t += 0.7) {
+    const JointState joints = jointSwing(robot.joints, t);
+    const BodyMotion P = test::Swing(4).motion(t);
+    MassColumns momentum, weight;
+    regressor.evaluate(X_PL0, g_I, {P.X.R, P.v, P.w, joints.q, joints.q_dot}, momentum, weight);
+    const MassVector by = MassVector::NullaryExpr(regressor.size(), [&] { return some(random); });
+
+    const auto ofRobot = [&](const RobotModel& of) -> std::pair<Vec6, Vec6> {
+      const Wrench in_L0 = Wrench::from(jointMomentum(of, joints.q, joints.q_dot));
+      const RigidBody whole = combine(RigidBody{}, X_PL0, compositeBody(of, joints.q));
+      const RigidBody whole_I = rotated(P.X.R, whole);
+      const Vec6 twist = (Vec6() << P.v, P.w).finished();
+      const Vec3 f = whole_I.mass * g_I;
+      return {rotate(P.X.R, transfer(X_PL0, in_L0)).stacked() + spatialMass(whole_I) * twist,
+              (Vec6() << f, whole_I.p_BoBcm_B.cross(f)).finished()};
+    };
+    const auto [momentum_0, weight_0] = ofRobot(robot);
+    const auto [momentum_1, weight_1] = ofRobot(regressor.changed(by));
+    ASSERT_LT((momentum * by - (momentum_1 - momentum_0)).norm(), 1e-10 * momentum_0.norm());
+    ASSERT_LT((weight * by - (weight_1 - weight_0)).norm(), 1e-10 * weight_0.norm());
+    ASSERT_GT((weight_1 - weight_0).norm(), 1e-3 * weight_0.norm());
   }
 }
 

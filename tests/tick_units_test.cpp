@@ -267,16 +267,17 @@ TEST(StaticLoad, GoesThroughTheSensorsFilterByTheShareOnly) {
   config.compensation.inertia = config.compensation.observer = true;
   const Mat3 level = Mat3::Identity(), tilted = rotation({0.3, 0.0, 0.0});
   JointVector q = JointVector::Zero();
+  const KnownPayload known(config);
   StaticLoad published(puma()), none(config), all(config);
   for (StaticLoad* load : {&published, &none, &all})
-    load->update(config.payload, q, level, 0.01, false, 0.0);
-  published.update(config.payload, q, tilted, 0.01, true, 0.0);
-  none.update(config.payload, q, tilted, 0.01, true, 0.0);
-  all.update(config.payload, q, tilted, 0.01, true, 1.0);
+    load->update(known, q, level, 0.01, false, 0.0);
+  published.update(known, q, tilted, 0.01, true, 0.0);
+  none.update(known, q, tilted, 0.01, true, 0.0);
+  all.update(known, q, tilted, 0.01, true, 1.0);
   EXPECT_LT((published.wrench().stacked() - none.wrench().stacked()).norm(), 1e-12);
   EXPECT_GT((published.wrench().f - all.wrench().f).norm(), 1.0);
   EXPECT_EQ(published.counts(), all.counts());  // unfiltered: what the frozen check expects
-  for (int n = 0; n < 200; ++n) all.update(config.payload, q, tilted, 0.01, true, 1.0);
+  for (int n = 0; n < 200; ++n) all.update(known, q, tilted, 0.01, true, 1.0);
   EXPECT_LT((published.wrench().stacked() - all.wrench().stacked()).norm(), 1e-6);
 }
 

@@ -42,6 +42,9 @@ Compensation readCompensation(Section& controller) {
   c.aided = s.choice("wrench", {"raw", "aided"}) == "aided";
   if (c.aided && !c.inertia)
     s.fail("wrench", "'aided' needs the robot's inertia taken out, want 'inertia: true'");
+  if (s.has("learns_masses")) c.learns_masses = s.flag("learns_masses");
+  if (c.learns_masses && !c.aided)
+    s.fail("learns_masses", "needs the robot's model beside the sensor, want 'wrench: aided'");
   c.gate = s.number("gate_deviations", 0.0, 100.0);
   c.gate_hold = s.number("gate_hold_s", 0.0, 100.0);
   c.timing_error = s.number("timing_error_s", 0.0, 0.005);

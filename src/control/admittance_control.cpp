@@ -9,7 +9,9 @@ namespace ves {
 
 AdmittanceControl::AdmittanceControl(const ControllerConfig& config)
     : model_(config.admittance, config.periodSeconds()),
+      hindsight_(config.periodSeconds()),
       inertia_(config.compensation.inertia),
+      aided_(config.compensation.aided),
       wrench_delay_(wrenchDelay(config.servo, config.periodSeconds())),
       port_(config),
       energy_(config),
@@ -45,6 +47,7 @@ const PathPoint<6>& AdmittanceControl::step(const AdmittanceInput& in, const Vec
                                             const PathChecks& checks) noexcept {
   if (in.F_Po_I.stacked().allFinite()) {
     const double since = begins_ ? std::min(in.wrench.since, period_) : in.wrench.since;
+    if (begins_ && aided_) hindsight_.reset(model_, in.lesson);
     begins_ = false;
     change_.advance(model_);
     const double damping = energy_.damping() + change_.damping();
@@ -53,6 +56,10 @@ const PathPoint<6>& AdmittanceControl::step(const AdmittanceInput& in, const Vec
                   in.wrench.age + in.share * wrench_delay_, damping);
     else
       model_.step(in.F_Po_I, damping);
+    if (aided_) {
+      hindsight_.step(model_, in.M_1, since, in.lesson);
+      if (hindsight_.any()) model_.displace(hindsight_.due());
+    }
     slowInsideEnvelope(last, in.L, checks);
     // Each is paid by its share of the damping.
     const double for_change =

@@ -314,6 +314,14 @@ PathPoint<6> AdmittanceModel::at(
   return out;
 }
 
+void AdmittanceModel::displace(const Modes& by) noexcept {
+  const auto& Phi = dynamics_.Phi();
+  now_.modes.eta += by.eta;
+  now_.modes.eta_dot += by.eta_dot;
+  now_.motion.x.noalias() += Phi * by.eta;
+  now_.motion.x_dot.noalias() += Phi * by.eta_dot;
+}
+
 void AdmittanceModel::slow(double share) noexcept {
   Modes& modes = now_.modes;
   PathPoint<6>& motion = now_.motion;  // which may be ahead of the modes

@@ -39,69 +39,247 @@ double largestFelt(const ServoModel& servo, double period, std::size_t samples) 
   return largest;
 }
 
-ResidualGate::ResidualGate(const ControllerConfig& config)
-    : deviations_(config.compensation.gate),
-      hold_(static_cast<int>(std::lround(config.compensation.gate_hold / config.periodSeconds()))) {
+ResidualGate::ResidualGate(const ControllerConfig& config) : deviations_(config.compensation.gate) {
   if (!config.compensation.aided) return;
   for (std::size_t i = 0; i < kMeans.size(); ++i)
-    felt_[i] = largestFelt(config.servo, config.periodSeconds(), kMeans[i]);
+    felt_[i] =
+        largestFelt(config.servo, config.periodSeconds(), static_cast<std::size_t>(kMeans[i]));
 }
 
-bool ResidualGate::open(const Vec6& residual, const ResidualNoise& noise) noexcept {
-  last_[taken_++ % kKept] = residual;
-  open_ = std::max(0, open_ - 1);
-  // Samples behind the sensor's filter are not quite independent: the calibration's mean says by
-  // how much less a mean tells. The six channels have the same filter.
+namespace {
+
+/// [count^2] of the sensor in the mean of n samples. Behind the sensor's filter they are not quite
+/// independent: the calibration's mean says by how much less a mean tells. The six channels have
+/// the same filter.
+Vec6 sensorVariance(int n, const ResidualNoise& noise) {
   const double total = noise.once.sum();
   const double correlation =
-      total > 0.0 ? std::max(1.0, kCalibrationSamples * noise.mean.sum() / total) : 1.0;
-  Vec6 sum = Vec6::Zero();
-  std::size_t n = 0;
-  for (std::size_t i = 0; i < kMeans.size() && taken_ >= kMeans[i]; ++i) {
-    for (; n < kMeans[i]; ++n) sum += last_[(taken_ - 1 - n) % kKept];
-    const double count = static_cast<double>(n);
-    const Vec6 variance =
-        (n == 1 ? 1.0 : correlation) / count * noise.once + noise.mean + noise.weight;
-    const Vec6 most = deviations_ * variance.cwiseSqrt() + felt_[i] * noise.legs;
-    if (!((sum / count).cwiseAbs().array() <= most.array()).all()) open_ = std::max(1, hold_);
-  }
-  return open_ > 0;
+      n > 1 && total > 0.0 ? std::max(1.0, kCalibrationSamples * noise.mean.sum() / total) : 1.0;
+  // Where no noise dithers them, what a count leaves out stays the same from sample to sample.
+  const auto undithered = (-4.0 * M_PI * M_PI * noise.once.array()).exp() / 12.0;
+  return correlation / n * noise.once + undithered.matrix();
+}
+
+}  // namespace
+
+bool ResidualGate::exceeds(std::size_t i, const Vec6& mean, const ResidualNoise& noise,
+                           const Vec6& unknown) const noexcept {
+  const Vec6 variance = sensorVariance(kMeans[i], noise) + noise.weight + unknown;
+  const Vec6 most = deviations_ * variance.cwiseSqrt() + felt_[i] * noise.legs;
+  return !(mean.cwiseAbs().array() <= most.array()).all();
+}
+
+Vec6 ResidualGate::variance(std::size_t i, const ResidualNoise& noise) noexcept {
+  return sensorVariance(kMeans[i], noise) + noise.weight;
 }
 
 AidedWrench::AidedWrench(const ControllerConfig& config)
     : aided_(config.compensation.aided),
+      hold_(std::max(1, static_cast<int>(
+                            std::lround(config.compensation.gate_hold / config.periodSeconds())))),
+      gravity_(config.gravity),
       geometry_(config.geometry),
       rounding_(config.servo.readings.scale.maxCoeff() / std::sqrt(12.0)),
       speed_of_count_(config.servo.extend.cwiseMax(config.servo.retract)
                           .cwiseProduct(config.servo.readings.scale)),
       X_SP_(inverse(config.sensor.X_PS)),
       S_proc_(inverse(config.sensor.C_proc)),
-      gate_(config) {}
+      X_PL0_(config.payload.X_PL0()),
+      regressor_(config.compensation.learns_masses ? config.payload.robot : RobotModel()),
+      common_(config.compensation.mass_error / std::sqrt(3.0)),
+      prior_(regressor_.deviations(common_)),
+      bias_deviation_(config.stillness.bias),
+      gate_(config),
+      twist_(config.servo.sensor_cutoff),
+      used_(MassVector::Zero(prior_.size())) {}
 
 Wrench AidedWrench::update(const Input& in, bool engaged) noexcept {
+  taught_ = false;
+  lesson_.learnt.resize(0);
+  lesson_.withheld = {};
+  lesson_.group_ends = false;
+  lesson_.replay = 0;
   if (!aided_) return in.measured;
   if (!engaged) {
-    gate_.reset();
+    restart();
+    settled_ = false;
+    open_ = 0;
     residuals_ = 0;
     reaction_ = {};
     withholds_ = false;
     return in.measured;
   }
   reaction_ = in.joints.force();
-  if (!in.bias.calibrated()) return in.measured;
+  calibrate(in);
+  if (!begun_) return in.measured;
   if (in.samples.fresh()) {
     constexpr std::int64_t kRefresh = 100;  // [-] samples: attitude and joints change slowly
     if (residuals_++ % kRefresh == 0) refreshNoise(in);
-    const Wrench residual = in.measured - in.joints.shown(in.w_IP_I);
-    withholds_ = !gate_.open(countsOf(residual, in.X_IP.R), noise_);
+    const Wrench residual = in.measured - in.joints.shown(in.robot.platform().w);
+    take(in, countsPerWrench(in.X_IP.R) * residual.stacked());
   }
   if (!withholds_) return in.measured;
-  return in.measured + Wrench::from(in.share * (reaction_ - in.measured).stacked());
+  lesson_.withheld = Wrench::from(in.share * (in.measured - reaction_).stacked());
+  return in.measured - lesson_.withheld;
+}
+
+/// A calibration measures bias and weight together: what it read beyond the weight then believed
+/// counts as bias.
+void AidedWrench::calibrate(const Input& in) noexcept {
+  if (in.bias.found() != bias_) {
+    if (begun_) belief_.moveBias(in.bias.found() - bias_);
+    bias_ = in.bias.found();
+    restart();
+  }
+  const bool took = taking_;
+  taking_ = in.bias.calibration().status() == CalibrationStatus::kTaking;
+  const bool done = in.bias.calibration().status() == CalibrationStatus::kDone;
+  if (!(done && (took || !begun_))) return;
+  if (!begun_) belief_.begin(prior_, common_, bias_deviation_);
+  begun_ = true;
+  MassColumns momentum, weight;
+  regressor_.evaluate(X_PL0_, gravity_, {in.X_IP.R, {}, {}, in.joints.q(), {}}, momentum, weight);
+  MassColumns columns;
+  columns.noalias() = countsPerWrench(in.X_IP.R) * weight;
+  refreshNoise(in);
+  belief_.learnAtRest(columns, columns * used_,
+                      sensorVariance(kCalibrationSamples, noise_) + noise_.weight);
+  restart();
+}
+
+void AidedWrench::restart() noexcept {
+  in_group_ = -1;
+  groups_ = 0;
+  sums_[0].columns.setZero(6, prior_.size());
+  sums_[0].y.setZero();
+  sums_[0].time = 0.0;
+  belief_.beginBlocks(legsMomentum());
+  beliefs_[0] = belief_;
+}
+
+/// A new sample's residual. [count]
+void AidedWrench::take(const Input& in, const Vec6& residual) noexcept {
+  const BodyMotion& P = in.robot.platform();
+  const double since = in.samples.wrench().since;
+  const Vec6 twist = (Vec6() << P.v, P.w).finished();
+  if (!settled_)
+    twist_.settle(twist.array());
+  else if (since > 0.0)
+    twist_.advance(twist_.prepare(since), twist.array());
+  settled_ = true;
+  const Vec6 felt = twist_.output().matrix();
+  regressor_.evaluate(X_PL0_, gravity_,
+                      {in.X_IP.R, felt.head<3>(), felt.tail<3>(), in.joints.q(), in.joints.q_dot()},
+                      momentum_, weight_);
+  lesson_.momentum = momentum_;
+  open_ = std::max(0, open_ - 1);
+  withholds_ = open_ == 0;
+  if (!withholds_) return;
+  const Vec6 beyond = weight_ * (belief_.parameters() - used_);
+  const Vec6 left =
+      residual + in.bias.learnt() - belief_.bias() - countsPerWrench(in.X_IP.R) * beyond;
+  if (gate_.exceeds(0, left, noise_, unknown_)) {
+    open(belief_, std::max(0, in_group_) + 1);
+    return;
+  }
+  if (in.share < 1.0) {
+    restart();
+  } else if (in_group_ < 0) {
+    in_group_ = 0;
+    residual_sum_.setZero();
+    group_time_ = 0.0;
+    momentum_before_ = momentum_;
+    weight_before_ = weight_;
+    lesson_.group_ends = true;  // where it begins
+  } else {
+    residual_sum_ += residual + in.bias.learnt();
+    group_time_ += since;
+    if (++in_group_ == Lesson::kGroup) endGroup(in);
+  }
+}
+
+void AidedWrench::endGroup(const Input& in) noexcept {
+  lesson_.group_ends = true;
+  const Sum& last = sums_[groups_++ % sums_.size()];
+  Sum& sum = sums_[groups_ % sums_.size()];
+  MassColumns one;
+  one.noalias() = countsPerWrench(in.X_IP.R) *
+                  (0.5 * (weight_before_ + weight_) - (momentum_ - momentum_before_) / group_time_);
+  sum.columns = last.columns + one;
+  sum.y = last.y + residual_sum_ / Lesson::kGroup;
+  sum.y.noalias() += one * used_;
+  sum.time = last.time + group_time_;
+  residual_sum_.setZero();
+  group_time_ = 0.0;
+  in_group_ = 0;
+  momentum_before_ = momentum_;
+  weight_before_ = weight_;
+  unknown_ = belief_.variance(one);
+  if (isForce(1, belief_)) return;
+  if (groups_ % kGroupsOfBlock != 0) return;
+
+  const std::size_t block = groups_ / kGroupsOfBlock - 1;
+  for (std::size_t i = 2; i < ResidualGate::kMeans.size(); ++i) {
+    const auto blocks =
+        static_cast<std::size_t>(ResidualGate::kMeans[i]) / (kGroupsOfBlock * Lesson::kGroup);
+    if (block + 1 >= blocks && isForce(i, beliefs_[(block + 1 - blocks) % kBlocks])) return;
+  }
+  const Sum& before = sums_[(groups_ - kGroupsOfBlock) % sums_.size()];
+  const double block_time = sum.time - before.time;
+  constexpr double kShare = 1.0 / static_cast<double>(kGroupsOfBlock);
+  belief_.learn(kShare * (sum.columns - before.columns), kShare * (sum.y - before.y),
+                ResidualGate::variance(2, noise_), legsMomentum(), block_time);
+  beliefs_[(block + 1) % kBlocks] = belief_;
+  use();
+}
+
+/// Judged by what was known `before`.
+bool AidedWrench::isForce(std::size_t mean, const MassBelief& before) noexcept {
+  const int samples = ResidualGate::kMeans[mean];
+  const auto n = static_cast<std::size_t>(samples / Lesson::kGroup);
+  const Sum &now = sums_[groups_ % sums_.size()], &then = sums_[(groups_ - n) % sums_.size()];
+  const MassColumns columns = (now.columns - then.columns) / static_cast<double>(n);
+  const Vec6 left = before.unexplained(columns, (now.y - then.y) / static_cast<double>(n));
+  if (!gate_.exceeds(mean, left, noise_, before.variance(columns))) return false;
+  open(before, samples);
+  return true;
+}
+
+void AidedWrench::open(const MassBelief& before, int samples) noexcept {
+  lesson_.replay = samples;
+  const MassBelief kept = before;  // which may be in beliefs_
+  belief_ = kept;
+  use();
+  restart();
+  withholds_ = false;
+  open_ = hold_;
+}
+
+/// The model has what is believed now, within reason.
+void AidedWrench::use() noexcept {
+  if (prior_.size() == 0) return;
+  constexpr double kMost = 6.0;  // [-] deviations
+  const MassVector next = belief_.parameters().cwiseMin(kMost * prior_).cwiseMax(-kMost * prior_);
+  if (next == used_) return;
+  lesson_.learnt = next - used_;
+  used_ = next;
+  taught_ = true;
+}
+
+/// Variance of what the platform's momentum, by the modelled legs, is off by at an instant. A leg
+/// that is early or late by an update of its LegSlave is off by K count for that long.
+Vec6 AidedWrench::legsMomentum() const noexcept {
+  constexpr double kShare = 0.05;  // [-] rms, of a leg that is off by K count for good: measured
+  return (kShare * noise_.legs).cwiseAbs2();
 }
 
 /// What the sensor reads of a wrench.
-Vec6 AidedWrench::countsOf(const Wrench& F_Po_I, const Mat3& R_IP) const noexcept {
-  return S_proc_ * transfer(X_SP_, rotate(R_IP.transpose(), F_Po_I)).stacked();
+Mat6 AidedWrench::countsPerWrench(const Mat3& R_IP) const noexcept {
+  Mat6 out;
+  for (int i = 0; i < 6; ++i)
+    out.col(i) =
+        S_proc_ * transfer(X_SP_, rotate(R_IP.transpose(), Wrench::from(Vec6::Unit(i)))).stacked();
+  return out;
 }
 
 /// A leg whose length is taken wrongly turns the weight; one whose acceleration is, the inertia.
@@ -110,19 +288,21 @@ void AidedWrench::refreshNoise(const Input& in) noexcept {
   noise_.mean = in.bias.standardError().cwiseAbs2();
   noise_.weight.setZero();
   noise_.legs.setZero();
-  const double mass = in.M_1(0, 0);
+  const Mat6& M_1 = in.robot.M_1();
+  const double mass = M_1(0, 0);
   if (!(mass > 0.0)) return;
-  const Vec3 p_PoBcm_I = Vec3(in.M_1(5, 1), in.M_1(3, 2), in.M_1(4, 0)) / mass;
+  const Vec3 p_PoBcm_I = Vec3(M_1(5, 1), M_1(3, 2), M_1(4, 0)) / mass;
+  const Mat6 counts = countsPerWrench(in.X_IP.R);
   LegMotion one;
   one.L = legLengths(geometry_, in.X_IP);
   for (int i = 0; i < kLegs; ++i) {
     BodyMotion P;
     one.L_ddot = Vec6::Unit(i);
     if (!forwardMotion(geometry_, in.X_IP, one, P)) return;
-    const Vec6 inertial = in.M_1 * (Vec6() << P.a, P.alpha).finished();
+    const Vec6 inertial = M_1 * (Vec6() << P.a, P.alpha).finished();
     const Vec3 turned = P.alpha.cross(in.weight.f);
     const auto squared = [&](double size, const Wrench& wrench) -> Vec6 {
-      return (size * countsOf(wrench, in.X_IP.R)).cwiseAbs2();
+      return (size * counts * wrench.stacked()).cwiseAbs2();
     };
     noise_.weight += squared(rounding_, {turned, p_PoBcm_I.cross(turned)});
     noise_.legs += squared(speed_of_count_(i), Wrench::from(inertial));

@@ -30,21 +30,13 @@ void JointMomentum::reset(const JointVector& q) noexcept {
   known_ = 0;
   begun_ = false;
   q_ = q;
+  shown_q_dot_.setZero();
   force_ = {};
 }
 
 void JointMomentum::update(const KnownPayload& known, const Sample& sample, const Mat3& R_IP,
                            double since) noexcept {
-  if (known.changed() && known_ == 3 && aided_) {
-    const Vec6 taken =
-        jointMomentum(known.carried(), last_[1].q, q_dot_) - input_.tail<6>().matrix();
-    Channels change = Channels::Zero();
-    change.tail<6>() = taken.array();
-    input_ += change;
-    filter_.raise(change);
-    before_.raise(change);
-    momentum_ += momentum(change);
-  }
+  if (known.changed() && known_ == 3 && aided_) relearn(known);
   if (!(since > 0.0)) return;
   if (known_ > 0 && sample.joints_time < last_[2].time) reset(sample.q);
   if (known_ == 0 || sample.joints_time > last_[2].time) {
@@ -57,13 +49,15 @@ void JointMomentum::update(const KnownPayload& known, const Sample& sample, cons
   q_ = sample.q;
   if (known_ < 3) return;
   const std::int64_t time = sample.wrench_time - delay_;
-  const Channels now = filtered(time);
+  const Filter at = filtered(time);
+  const Channels& now = at.output();
   q_ = now.head<kMaxJoints>().matrix();
+  shown_q_dot_ = at.rate().head<kMaxJoints>().matrix();
   if (!aided_) return;
   X_PL0_ = known.payload().X_PL0();
   R_IP_ = R_IP;
-  const Vec6 before = momentum_, begin = momentum(filtered(time + begin_)),
-             end = momentum(filtered(time + end_));
+  const Vec6 before = momentum_, begin = momentum(filtered(time + begin_).output()),
+             end = momentum(filtered(time + end_).output());
   momentum_ = momentum(now);
   force_ = begun_ ? Wrench::from((before - momentum_) / since) : Wrench{};
   begun_ = true;
@@ -75,6 +69,37 @@ Wrench JointMomentum::shown(const Vec3& w_IP_I) const noexcept {
   if (!begun_) return {};
   return Wrench::from(shown_) -
          Wrench{w_IP_I.cross(mean_.head<3>()), w_IP_I.cross(mean_.tail<3>())};
+}
+
+/// What has been filtered so far becomes that of the masses as they are known now.
+void JointMomentum::relearn(const KnownPayload& known) noexcept {
+  constexpr double kStep = 1e-4;  // [s] for a rate
+  const auto change = [&](const JointVector& q, const JointVector& q_dot) -> Channels {
+    Channels out = Channels::Zero();
+    out.tail<6>() =
+        (jointMomentum(known.carried(), q, q_dot) - jointMomentum(known.before(), q, q_dot))
+            .array();
+    return out;
+  };
+  const auto rate = [&](const JointVector& q, const JointVector& q_dot, const JointVector& q_ddot,
+                        const Channels& now) -> Channels {
+    return (change(q + kStep * q_dot, q_dot + kStep * q_ddot) - now) / kStep;
+  };
+  const Channels input = change(last_[1].q, q_dot_),
+                 input_rate = rate(last_[1].q, q_dot_, q_ddot_, input);
+  const auto raise = [&](Filter& filter, const Channels& in) {
+    const JointVector q = filter.output().head<kMaxJoints>().matrix(),
+                      q_dot = filter.rate().head<kMaxJoints>().matrix(),
+                      q_ddot = filter.curve().head<kMaxJoints>().matrix();
+    const Channels out = change(q, q_dot), out_rate = rate(q, q_dot, q_ddot, out);
+    filter.raise(in, out, out_rate);
+  };
+  raise(before_, input - seconds(last_[0].time, last_[1].time) * input_rate);
+  raise(filter_, input);
+  input_ += input;
+  rate_ += input_rate;
+  chord_ += input_rate;
+  momentum_ += momentum(change(q_, shown_q_dot_));
 }
 
 /// Divided differences of the three angles: they hold where the middle one was read.
@@ -105,7 +130,7 @@ void JointMomentum::addMiddle(const KnownPayload& known, bool first) noexcept {
 }
 
 /// What is filtered runs along parabolas.
-JointMomentum::Channels JointMomentum::filtered(std::int64_t time) const noexcept {
+JointMomentum::Filter JointMomentum::filtered(std::int64_t time) const noexcept {
   const double ahead = seconds(last_[1].time, time);
   const Channels input = input_ + ahead * rate_ + 0.5 * ahead * ahead * curve_;
   Filter at = filter_;
@@ -115,7 +140,7 @@ JointMomentum::Channels JointMomentum::filtered(std::int64_t time) const noexcep
     at = before_;
     at.advanceAlong(at.prepare(since), input, curve_);
   }
-  return at.output();
+  return at;
 }
 
 /// About Po in I.

@@ -11,10 +11,12 @@ KnownPayload::KnownPayload(const ControllerConfig& config)
       told_(config.told_loads),
       period_(config.period),
       payload_(config.payload),
-      carried_(ves::carried(config.payload)) {}
+      carried_(ves::carried(config.payload)),
+      before_(carried_) {}
 
 void KnownPayload::update(const Elapsed& elapsed, std::int32_t commanded) noexcept {
-  changed_ = false;
+  changed_ = learnt_ = learns_;
+  learns_ = false;
   if (commanded != segment_) {
     if (commanded < segment_) done_.fill(false);  // a program begins anew
     segment_ = commanded;
@@ -25,14 +27,22 @@ void KnownPayload::update(const Elapsed& elapsed, std::int32_t commanded) noexce
     const Cue& cue = told_.loads[i].cue;
     if (done_[i] || cue.segment != segment_ || since < cue.after) continue;
     done_[i] = true;
-    take(told_.loads[i]);
+    in_hand_ = told_.loads[i];
+    changed_ = true;
   }
+  if (changed_) take();
 }
 
-void KnownPayload::take(const ToldLoad& load) noexcept {
-  payload_.robot = withLoad(empty_, load.link, load.body);
+void KnownPayload::learn(const RobotModel& robot) noexcept {
+  empty_ = robot;
+  learns_ = true;
+}
+
+void KnownPayload::take() noexcept {
+  payload_.robot =
+      in_hand_.body.mass > 0.0 ? withLoad(empty_, in_hand_.link, in_hand_.body) : empty_;
+  before_ = carried_;
   carried_ = ves::carried(payload_);
-  changed_ = true;
 }
 
 StaticLoad::StaticLoad(const ControllerConfig& config)
@@ -42,10 +52,12 @@ StaticLoad::StaticLoad(const ControllerConfig& config)
       filter_(config.servo.sensor_cutoff),
       averages_(config.servo.sensor_window > 0.0) {}
 
-void StaticLoad::update(const Payload& payload, const JointVector& q, const Mat3& R_IP,
+void StaticLoad::update(const KnownPayload& known, const JointVector& q, const Mat3& R_IP,
                         double since, bool engaged, double share) noexcept {
-  F_So_S_ = staticWrench(payload, q, R_IP, gravity_);
+  F_So_S_ = staticWrench(known.payload(), q, R_IP, gravity_);
   const Vec6 weight = F_So_S_.stacked();
+  if (known.learnt()) filter_.raise((weight - weight_).array());
+  weight_ = weight;
   counts_ = S_proc_ * weight;
   if (!filters_ || !weight.allFinite()) return;
   if (!engaged) {
@@ -71,7 +83,7 @@ Wrench RobotInertia::update(const KnownPayload& known, std::int64_t count, const
                             bool engaged, double share) noexcept {
   if (!compensated_ || !engaged) {
     known_ = false;
-    w_IP_I_.setZero();
+    platform_ = {};
     return {};
   }
   const bool first = !known_ || known.changed();
@@ -88,7 +100,7 @@ Wrench RobotInertia::update(const KnownPayload& known, std::int64_t count, const
   before_ = share * whole_before_;
   BodyMotion P;
   if (!forwardMotion(geometry_, X_IP, legs, P)) return {};
-  w_IP_I_ = P.w;
+  platform_ = P;
   Vec6 momentum_rate = M_1_ * (Vec6() << P.a, P.alpha).finished();
   if (since_ > 0.0) momentum_rate += (M_1_ - before_).rightCols<3>() * P.w / since_;
   return Wrench::from(momentum_rate);

@@ -43,7 +43,8 @@ void SensorBias::calibrate(const Sample& sample, bool fresh, const Vec6& static_
   if (fresh) calibration_.add(sample, static_counts);
   if (calibration_.status() != CalibrationStatus::kDone) return;
   calibrated_ = true;
-  bias_ = calibration_.statistics().mean();
+  found_ = calibration_.statistics().mean();
+  learnt_.setZero();
   deviation_ = calibration_.statistics().deviation();
   standard_error_ = calibration_.statistics().standardError();
 }

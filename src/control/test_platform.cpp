@@ -33,8 +33,7 @@ const TickState& TestPlatform::tick(const TickInput& in) noexcept {
   const Transform& X_IP = legs_.update(samples_, elapsed, following, commander_).X_IP;  // (2.23)
 
   known_.update(elapsed, commander_.command().segment);
-  load_.update(known_.payload(), sample.q, X_IP.R, samples_.wrench().since, engaged,
-               share_.value());
+  load_.update(known_, sample.q, X_IP.R, samples_.wrench().since, engaged, share_.value());
   bias_.stepTare(sample, samples_.fresh(), load_.counts());
   // The measured attitude: the commanded one leads it by the servo's lag, and the difference would
   // pass as a wrench of the robot's weight.
@@ -46,9 +45,12 @@ const TickState& TestPlatform::tick(const TickInput& in) noexcept {
   W.inertial = robot_.update(known_, elapsed.count, joints_.q(), samples_.wrench().since, X_IP,
                              legs_.feltMotion(), engaged, share_.value());
   const Wrench measured = W.total - W.static_wrench + W.inertial;
-  W.felt = aided_.update({measured, W.static_wrench, robot_.M_1(), robot_.w_IP_I(), joints_,
-                          samples_, bias_, X_IP, share_.value()},
-                         engaged);
+  W.felt = aided_.update(
+      {measured, W.static_wrench, robot_, joints_, samples_, bias_, X_IP, share_.value()}, engaged);
+  if (aided_.taught()) {
+    known_.learn(aided_.robot());
+    bias_.learn(aided_.belief().bias());
+  }
   if (!engaged) filter_.reset();
   W.dynamic = filter_.update(W.felt);
   safety_.watch(elapsed, samples_, load_.counts());
@@ -88,7 +90,7 @@ Waypoint<6> TestPlatform::nextMotion(const Wrenches& W) noexcept {
   if (supervisor_.runs(motion_, SegmentKind::kAdmittance))
     return motion_.admittanceModel(
         {W.dynamic, W.felt, robot_.M_1(), robot_.before(), share_.value(), samples_.wrench(),
-         sample.q, commander_.legs().L, legs_.measured().X_IP, legs_.servo()},
+         aided_.lesson(), sample.q, commander_.legs().L, legs_.measured().X_IP, legs_.servo()},
         safety_.path());
   if (supervisor_.moves()) return motion_.trajectoryGeneration();
   // Until the legs follow, they are where they are measured.

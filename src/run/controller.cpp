@@ -59,7 +59,8 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
   const Identity self = Identity::draw();
   Bus bus(options.url);
   ControllerLink link(bus, self);
-  TestPlatform platform(experiment.controller);
+  const auto whole = std::make_unique<TestPlatform>(experiment.controller);
+  TestPlatform& platform = *whole;  // large for a stack
   FlightRecord flight(experiment, options.flight);
   RunMonitor monitor(experiment.controller, !options.start);
 

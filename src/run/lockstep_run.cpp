@@ -35,7 +35,8 @@ RunResult runRecorded(const Experiment& experiment, RunRecorder* recorder, const
                       Request first) {
   requireSimulated(experiment);
   const Identity controller{1, 0}, machine{2, 0};
-  Lockstep loop(experiment.controller, experiment.plant);
+  const auto whole = std::make_unique<Lockstep>(experiment.controller, experiment.plant);
+  Lockstep& loop = *whole;  // large for a stack
   RunMonitor monitor(experiment.controller);
   const auto time = [&] { return loop.plant().time(); };
   if (recorder) recorder->begin(describe(experiment, controller, 0));

@@ -5,6 +5,7 @@
 
 #include "ves/control/controller_config.hpp"
 #include "ves/control/energy_account.hpp"
+#include "ves/control/hindsight.hpp"
 #include "ves/control/monitors.hpp"
 #include "ves/control/path_checks.hpp"
 #include "ves/control/tick_clock.hpp"
@@ -20,6 +21,7 @@ struct AdmittanceInput {
   const Mat6& M_1_before;      // and before the newest sample
   double share;                // [-] of the compensation
   const WrenchTiming& wrench;  // when F_Po_I was read
+  const Lesson& lesson;        // what was found out
   const JointVector& q;        // of the robot
   const Vec6& L;               // [m] lengths last commanded
   const Transform& X_IP;       // as measured
@@ -60,9 +62,10 @@ class AdmittanceControl {
   void slowInsideEnvelope(const Vec6& last, const Vec6& L, const PathChecks& checks) noexcept;
 
   AdmittanceModel model_;
-  bool inertia_;         // compensated
-  double wrench_delay_;  // [s]
-  bool begins_ = true;   // the first step: what was before it does not count
+  Hindsight hindsight_;
+  bool inertia_, aided_;  // compensated, what the model feels
+  double wrench_delay_;   // [s]
+  bool begins_ = true;    // the first step: what was before it does not count
   Oscillation oscillation_;
   PortWork port_;
   EnergyAccount energy_;

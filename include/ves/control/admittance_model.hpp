@@ -153,6 +153,9 @@ class AdmittanceModel {
   /// the path stays and only the motion along it is slowed.
   void slow(double share) noexcept;
 
+  /// Is elsewhere by so much, and as much faster, from the last step's end on.
+  void displace(const ModalDynamics::Modes& by) noexcept;
+
   /// The next step's vehicle, where and as fast as this one is.
   void become(const VehicleFactors& factors) noexcept;
   const VehicleFactors& factors() const noexcept { return factors_; }
@@ -182,6 +185,7 @@ class AdmittanceModel {
   /// (C.7): position, velocity, acceleration at the last step's end, or ahead of it.
   const PathPoint<6>& motion() const noexcept { return now_.motion; }
 
+  const ModalDynamics& dynamics() const noexcept { return dynamics_; }
   int modes() const noexcept { return static_cast<int>(dynamics_.size()); }
   bool coupled() const noexcept { return dynamics_.coupled(); }
 

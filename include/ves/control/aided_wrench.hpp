@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // The wrench without the sensor's noise: what the robot's joints do is computed from their angles,
-// and of what the sensor shows beyond that only significant residuals pass. Beyond the report.
+// and of what the sensor shows beyond that, masses and bias are learnt, and forces pass. Beyond the
+// report.
 #pragma once
 
+#include "ves/control/hindsight.hpp"
 #include "ves/control/joint_momentum.hpp"
+#include "ves/control/mass_belief.hpp"
 #include "ves/control/sensor_bias.hpp"
 
 namespace ves {
@@ -22,30 +25,34 @@ struct ResidualNoise {
                                // modelled, and so goes K count quicker; per [1/s] of largestFelt()
 };
 
-/// Whether a residual is more than noise: its mean over 1, 5 or 50 samples, in any channel.
+/// Whether the mean of residuals over some samples is more than noise, in any channel.
 class ResidualGate {
  public:
+  /// [-] samples: one, and groups of Lesson::kGroup.
+  static constexpr std::array<int, 5> kMeans = {1, 5, 20, 60, 200};
+
   explicit ResidualGate(const ControllerConfig& config);
 
-  void reset() noexcept { taken_ = 0, open_ = 0; }
-  /// A new sample's residual [count]. Stays open for a while after the last that was more.
-  bool open(const Vec6& residual, const ResidualNoise& noise) noexcept;
+  /// `mean` [count] over kMeans[i] samples; `unknown` [count^2] its variance for want of knowledge
+  /// of masses and bias.
+  bool exceeds(std::size_t i, const Vec6& mean, const ResidualNoise& noise,
+               const Vec6& unknown) const noexcept;
+  /// [count^2] of the sensor and the attitude in the mean over kMeans[i] samples.
+  static Vec6 variance(std::size_t i, const ResidualNoise& noise) noexcept;
 
  private:
-  static constexpr std::array<std::size_t, 3> kMeans = {1, 5, 50};  // [-] samples
-  static constexpr std::size_t kKept = 50;
-
-  double deviations_;                       // [-]
-  std::array<double, kMeans.size()> felt_;  // [1/s] largestFelt()
-  int hold_;                                // [-] samples
-  std::array<Vec6, kKept> last_{};          // a ring
-  std::size_t taken_ = 0;                   // [-] so far
-  int open_ = 0;                            // [-] samples to come
+  double deviations_;                         // [-]
+  std::array<double, kMeans.size()> felt_{};  // [1/s] largestFelt()
 };
 
 /// The admittance model's input: the measured wrench, or the modelled one while they differ by no
-/// more than noise. So it is never further from the measured one than the gate lets a residual be.
-/// The sensor's noise is what its last calibration found; without one everything passes.
+/// more than noise and what is not known of the masses explain.
+///
+/// Masses and bias are learnt from the means of what is left (MassBelief), from the calibration on:
+/// that is one measurement of bias and weight together. What means of 1 to 200 samples show beyond
+/// it is a force: it passes, the base is given what was withheld of it, and what was learnt from it
+/// is forgotten. The sensor's noise is what its last calibration found; without one everything
+/// passes.
 class AidedWrench {
  public:
   explicit AidedWrench(const ControllerConfig& config);
@@ -53,8 +60,7 @@ class AidedWrench {
   struct Input {
     const Wrench& measured;  // F_Po_I that the sensor shows beyond weight and inertia
     const Wrench& weight;    // F_Po_I
-    const Mat6& M_1;         // RobotInertia
-    const Vec3& w_IP_I;      // [rad/s] of the platform, when the newest sample was taken
+    const RobotInertia& robot;
     const JointMomentum& joints;
     const SampleStream& samples;
     const SensorBias& bias;
@@ -68,20 +74,72 @@ class AidedWrench {
   const Wrench& reaction() const noexcept { return reaction_; }  // F_Po_I, modelled
   bool withholds() const noexcept { return withholds_; }         // the residual
   const ResidualNoise& noise() const noexcept { return noise_; }
+  const MassBelief& belief() const noexcept { return belief_; }
+  /// Of this tick.
+  const Lesson& lesson() const noexcept { return lesson_; }
+  /// The robot to reckon with from the next tick on, where this one taught another.
+  bool taught() const noexcept { return taught_; }
+  RobotModel robot() const noexcept { return regressor_.changed(used_); }
 
  private:
-  Vec6 countsOf(const Wrench& F_Po_I, const Mat3& R_IP) const noexcept;
+  /// Sums of means over groups of samples: residuals [count], beyond the first belief, and what
+  /// each parameter adds to them.
+  struct Sum {
+    MassColumns columns;
+    Vec6 y = Vec6::Zero();
+    double time = 0.0;  // [s]
+  };
+  static constexpr std::size_t kGroupsOfBlock = 4;  // what is learnt from
+  static constexpr std::size_t kGroups = 40, kBlocks = kGroups / kGroupsOfBlock;  // at most
+
+  void calibrate(const Input& in) noexcept;
+  void take(const Input& in, const Vec6& residual) noexcept;
+  void endGroup(const Input& in) noexcept;
+  bool isForce(std::size_t mean, const MassBelief& before) noexcept;
+  void open(const MassBelief& before, int samples) noexcept;
+  void restart() noexcept;
+  void use() noexcept;
+  Mat6 countsPerWrench(const Mat3& R_IP) const noexcept;  // about Po in I
   void refreshNoise(const Input& in) noexcept;
+  Vec6 legsMomentum() const noexcept;  // [count^2 s^2]
 
   bool aided_;
+  int hold_;  // [-] samples
+  Vec3 gravity_;
   Geometry geometry_;
   double rounding_;      // [m] of a leg, rms
   Vec6 speed_of_count_;  // [m/s] K times a count
   Transform X_SP_;
   Mat6 S_proc_;  // [count per N | N m]
+  Transform X_PL0_;
+  MassRegressor regressor_;
+  double common_;          // [-] deviation of all bodies' density,
+  MassVector prior_;       // [-, m] and of each parameter besides
+  double bias_deviation_;  // [count] before a calibration
   ResidualGate gate_;
   ResidualNoise noise_;
+  Butterworth2<6> twist_;       // of the platform, as the wrench shows it
+  bool settled_ = false;        // twist_
   std::int64_t residuals_ = 0;  // [-] so far
+
+  MassBelief belief_;
+  MassVector used_;                      // the parameters that the model has
+  Vec6 bias_ = Vec6::Zero();             // [count] that belief_ counts its bias from
+  bool begun_ = false, taking_ = false;  // a calibration
+  bool taught_ = false;
+
+  MassColumns momentum_, weight_;                // of the newest sample, about Po in I
+  MassColumns momentum_before_, weight_before_;  // as the group began
+  Vec6 residual_sum_ = Vec6::Zero();
+  double group_time_ = 0.0;              // [s]
+  int in_group_ = 0;                     // [-] samples; -1: nothing is known of the time before it
+  Vec6 unknown_ = Vec6::Zero();          // [count^2] of a group
+  std::array<Sum, kGroups + 1> sums_{};  // a ring, the newest at groups_
+  std::size_t groups_ = 0;
+  std::array<MassBelief, kBlocks> beliefs_{};  // before each block, a ring
+  int open_ = 0;                               // [-] samples to come
+
+  Lesson lesson_;
   Wrench reaction_;
   bool withholds_ = false;
 };

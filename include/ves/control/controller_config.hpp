@@ -27,12 +27,13 @@ struct Compensation {
   double adaptation_limit = 1.25;  // [-] times gain_error and timing_error, how far they may go
   double forgetting = 60.0;        // [s] of motion that counts for them, to 1/e
   bool aided = false;              // sensor noise kept out by the robot's model
+  bool learns_masses = false;      // from what is kept out
   double gate = 4.5;               // [-] deviations of the noise that a residual has to be above
   double gate_hold = 0.1;          // [s] for which it passes then
   // What the belief may be wrong by, for which the loop has to decay (analysis/gate.hpp).
   double timing_error = 0.0;  // [s] of the wrench
   double gain_error = 0.0;    // [-] of the servos
-  double mass_error = 0.0;    // [-] of the robot
+  double mass_error = 0.0;    // [-] of the robot's bodies, mass and centre
 
   bool any() const noexcept { return feed_forward || observer; }
 };

@@ -21,6 +21,7 @@ class JointMomentum {
               double since) noexcept;
 
   const JointVector& q() const noexcept { return q_; }  // [rad | m] as the wrench shows them
+  const JointVector& q_dot() const noexcept { return shown_q_dot_; }  // [rad/s | m/s] the same
   /// F_Po_I of the joints on a base at rest: what the momentum has lost since the sample before,
   /// per second. Its sum over time loses nothing. Zero where only inertia is compensated.
   const Wrench& force() const noexcept { return force_; }
@@ -36,8 +37,9 @@ class JointMomentum {
   using Filter = Butterworth2<kMaxJoints + 6>;  // of angles and momentum
   using Channels = Filter::Channels;
 
+  void relearn(const KnownPayload& known) noexcept;
   void addMiddle(const KnownPayload& known, bool first) noexcept;
-  Channels filtered(std::int64_t time) const noexcept;
+  Filter filtered(std::int64_t time) const noexcept;
   Vec6 momentum(const Channels& filtered) const noexcept;
 
   bool aided_;
@@ -50,7 +52,7 @@ class JointMomentum {
   JointVector q_dot_ = JointVector::Zero(), q_ddot_ = JointVector::Zero();
   Channels input_ = Channels::Zero(), rate_ = Channels::Zero(), curve_ = Channels::Zero();
   Channels chord_ = Channels::Zero();  // rate from the one before to it
-  JointVector q_ = JointVector::Zero();
+  JointVector q_ = JointVector::Zero(), shown_q_dot_ = JointVector::Zero();
   Transform X_PL0_;
   Mat3 R_IP_ = Mat3::Identity();
   bool begun_ = false;            // there is a sample before

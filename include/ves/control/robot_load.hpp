@@ -18,24 +18,29 @@ class KnownPayload {
 
   /// `commanded` [-]: segment that the last command named, which the program's times count from.
   void update(const Elapsed& elapsed, std::int32_t commanded) noexcept;
+  /// The robot is known better: what it has carried all along.
+  void learn(const RobotModel& robot) noexcept;
 
   const Payload& payload() const noexcept { return payload_; }
   /// All of it, counted into the robot's links.
   const RobotModel& carried() const noexcept { return carried_; }
-  bool changed() const noexcept { return changed_; }  // in this tick
+  const RobotModel& before() const noexcept { return before_; }  // carried() until the last change
+  bool changed() const noexcept { return changed_; }             // in this tick,
+  bool learnt() const noexcept { return learnt_; }               // and learnt
 
  private:
-  void take(const ToldLoad& load) noexcept;
+  void take() noexcept;
 
   RobotModel empty_;  // with nothing in hand
+  ToldLoad in_hand_;
   ToldLoads told_;
   std::int64_t period_;  // [ns]
   Payload payload_;
-  RobotModel carried_;
+  RobotModel carried_, before_;
   std::int32_t segment_ = -1;  // [-]
   std::int64_t began_ = 0;     // [-] tick of the first command that named it
   std::array<bool, kMaxToldLoads> done_{};
-  bool changed_ = false;
+  bool changed_ = false, learnt_ = false, learns_ = false;
 };
 
 /// The weight of everything the sensor carries.
@@ -45,7 +50,7 @@ class StaticLoad {
 
   /// For joints at q, the platform turned by R_IP, `since` [s] after the time before. `share` [-]
   /// of the compensation is in; `engaged`: the legs follow, so that the weight has a past.
-  void update(const Payload& payload, const JointVector& q, const Mat3& R_IP, double since,
+  void update(const KnownPayload& known, const JointVector& q, const Mat3& R_IP, double since,
               bool engaged, double share) noexcept;
 
   /// [count] what the weight alone would read, without a bias.
@@ -61,7 +66,7 @@ class StaticLoad {
   Butterworth2<6> filter_;  // the sensor's
   bool averages_;           // the sensor's readings, over about the time between two of its samples
   Vec6 counts_ = Vec6::Zero();
-  Vec6 felt_ = Vec6::Zero();  // [N, N m] as the newest wrench shows it
+  Vec6 weight_ = Vec6::Zero(), felt_ = Vec6::Zero();  // [N, N m], as the newest wrench shows it
   Wrench F_So_S_;
 };
 
@@ -81,8 +86,9 @@ class RobotInertia {
   const Mat6& M_1() const noexcept { return M_1_; }
   /// The same before the newest sample, the share as now.
   const Mat6& before() const noexcept { return before_; }
-  /// Of the platform, when the newest sample was taken; zero where it is not looked at.
-  const Vec3& w_IP_I() const noexcept { return w_IP_I_; }  // [rad/s]
+  /// Of the platform in I, when the newest sample was taken, its accelerations as the wrench shows
+  /// them; zero where it is not looked at.
+  const BodyMotion& platform() const noexcept { return platform_; }
 
  private:
   bool compensated_;
@@ -95,7 +101,7 @@ class RobotInertia {
   Mat6 whole_before_ = Mat6::Zero();
   double since_ = 0.0;  // [s] between the two
   Mat6 M_1_ = Mat6::Zero(), before_ = Mat6::Zero();
-  Vec3 w_IP_I_ = Vec3::Zero();
+  BodyMotion platform_;
 };
 
 }  // namespace ves

@@ -41,19 +41,30 @@ class SensorBias {
   explicit SensorBias(const ControllerConfig& config)
       : tare_(config.tare_ramp, config.periodSeconds(), config.stillness.bias),
         calibration_(config.stillness),
-        bias_(config.bias) {}
+        found_(config.bias) {}
 
-  void beginTare() noexcept { tare_.begin(); }
-  void cancelTare() noexcept { tare_.cancel(bias_); }
+  void beginTare() noexcept {
+    found_ += learnt_;
+    learnt_.setZero();
+    tare_.begin();
+  }
+  void cancelTare() noexcept { tare_.cancel(found_); }
   bool taring() const noexcept { return tare_.running(); }
   void stepTare(const Sample& sample, bool fresh, const Vec6& static_counts) noexcept {
-    tare_.step(sample, fresh, static_counts, bias_);
+    tare_.step(sample, fresh, static_counts, found_);
   }
 
   void beginCalibration() noexcept { calibration_.begin(); }
   void calibrate(const Sample& sample, bool fresh, const Vec6& static_counts) noexcept;
 
-  const Vec6& counts() const noexcept { return bias_; }  // [count]
+  /// [count] beyond found(), by what the measurement shows of it; not during a tare.
+  void learn(const Vec6& bias) noexcept {
+    if (!taring()) learnt_ = bias;
+  }
+
+  Vec6 counts() const noexcept { return found_ + learnt_; }  // [count]
+  const Vec6& found() const noexcept { return found_; }      // [count] by calibration and tare
+  const Vec6& learnt() const noexcept { return learnt_; }    // [count] besides
   const Calibration& calibration() const noexcept { return calibration_; }
   bool calibrated() const noexcept { return calibrated_; }  // once at least
   /// Of the last calibration that succeeded. [count]
@@ -63,7 +74,7 @@ class SensorBias {
  private:
   Tare tare_;
   Calibration calibration_;
-  Vec6 bias_;
+  Vec6 found_, learnt_ = Vec6::Zero();
   bool calibrated_ = false;
   Vec6 deviation_ = Vec6::Zero(), standard_error_ = Vec6::Zero();
 };

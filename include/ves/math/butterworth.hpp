@@ -63,14 +63,17 @@ class Butterworth2 {
   /// The input changes at once: the next step's is constant when it ends at u too.
   void jump(const Channels& u) noexcept { u_ = u; }
 
-  /// As if everything so far had been so much more.
-  void raise(const Channels& by) noexcept {
-    u_ += by;
-    y_ += by;
+  /// As if everything so far had been more: the input by so much, the output, and its rate.
+  void raise(const Channels& input, const Channels& output, const Channels& rate) noexcept {
+    u_ += input;
+    y_ += output;
+    y_dot_ += rate;
   }
+  void raise(const Channels& by) noexcept { raise(by, by, Channels::Zero()); }
 
   const Channels& output() const noexcept { return y_; }
   const Channels& rate() const noexcept { return y_dot_; }  // of the output
+  Channels curve() const noexcept { return w_ * w_ * (u_ - y_) - M_SQRT2 * w_ * y_dot_; }
 
  private:
   double w_;                           // [rad/s]

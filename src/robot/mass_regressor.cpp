@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/robot/mass_regressor.hpp"
+
+#include <algorithm>
+
+namespace ves {
+namespace {
+
+/// Mass, first moment and inertia about the link's origin: what momentum and weight are linear in.
+struct Moments {
+  double mass = 0.0;      // [kg]
+  Vec3 s = Vec3::Zero();  // [kg m]
+  Mat3 I = Mat3::Zero();  // [kg m^2]
+};
+
+Moments momentsOf(const RigidBody& body) {
+  const Vec3& c = body.p_BoBcm_B;
+  return {body.mass, body.mass * c,
+          body.I_Bcm_B + body.mass * (c.squaredNorm() * Mat3::Identity() - c * c.transpose())};
+}
+
+/// Per parameter: of density, or of a shift of the centre along an axis, as far as linear.
+Moments momentsPer(const RigidBody& body, int parameter) {
+  if (parameter == 0) return momentsOf(body);
+  const Vec3 e = Vec3::Unit(parameter - 1), &c = body.p_BoBcm_B;
+  return {0.0, body.mass * e,
+          body.mass *
+              (2.0 * c(parameter - 1) * Mat3::Identity() - e * c.transpose() - c * e.transpose())};
+}
+
+}  // namespace
+
+MassRegressor::MassRegressor(const RobotModel& robot) : robot_(robot) {
+  std::array<int, kMaxLinks + 1> all{};
+  int size = 0;
+  for (int i = -1; i < robot.size; ++i)
+    if (robot_.bodyOf(i).mass > 0.0) all[static_cast<std::size_t>(size++)] = i;
+  std::stable_sort(all.begin(), all.begin() + size,
+                   [&](int a, int b) { return robot_.bodyOf(a).mass > robot_.bodyOf(b).mass; });
+  count_ = std::min(size, kMaxUncertain);
+  std::sort(all.begin(), all.begin() + count_);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count_); ++i) {
+    links_[i] = all[i];
+    body_[i] = robot_.bodyOf(all[i]);
+  }
+}
+
+MassVector MassRegressor::deviations(double share) const noexcept {
+  MassVector out(size());
+  for (int i = 0; i < count_; ++i) {
+    out(4 * i) = share;
+    out.segment<3>(4 * i + 1).setConstant(share *
+                                          body_[static_cast<std::size_t>(i)].p_BoBcm_B.norm());
+  }
+  return out;
+}
+
+void MassRegressor::evaluate(const Transform& X_PL0, const Vec3& g_I, const State& at,
+                             MassColumns& momentum, MassColumns& weight) const noexcept {
+  // Motion of each link on a base at rest, in its own axes.
+  std::array<Mat3, kMaxLinks> R;        // link in L0
+  std::array<Vec3, kMaxLinks> p, v, w;  // origin in L0
+  const auto links = static_cast<std::size_t>(robot_.size);
+  for (std::size_t k = 0; k < links; ++k) {
+    const Link& link = robot_.links[k];
+    const double rate = link.ratio * at.q_dot(link.joint);
+    setLinkPose(link, link.at(at.q(link.joint)), R[k], p[k]);
+    if (link.parent < 0) {
+      w[k].setZero();
+      v[k].setZero();
+    } else {
+      const auto c = static_cast<std::size_t>(link.parent);
+      w[k] = R[k].transpose() * w[c];
+      v[k] = R[k].transpose() * (v[c] + w[c].cross(p[k]));
+      p[k] = p[c] + R[c] * p[k];
+      R[k] = (R[c] * R[k]).eval();
+    }
+    (link.type == JointType::kRevolute ? w[k] : v[k]) += rate * link.axis;
+  }
+
+  momentum.resize(6, size());
+  weight.resize(6, size());
+  const Transform X_IL0{at.R_IP * X_PL0.R, at.R_IP * X_PL0.p};  // about Po
+  for (int i = 0; i < count_; ++i) {
+    const int link = links_[static_cast<std::size_t>(i)];
+    const RigidBody& body = body_[static_cast<std::size_t>(i)];
+    const auto k = static_cast<std::size_t>(std::max(0, link));
+    const Transform X_IL = link < 0 ? X_IL0 : Transform{X_IL0.R * R[k], X_IL0.p + X_IL0.R * p[k]};
+    const Mat3 R_LI = X_IL.R.transpose();
+    Vec3 turns = R_LI * at.w, moves = R_LI * (at.v + at.w.cross(X_IL.p));
+    if (link >= 0) {
+      turns += w[k];
+      moves += v[k];
+    }
+    const Vec3 g = R_LI * g_I;
+    for (int j = 0; j < 4; ++j) {
+      const Moments m = momentsPer(body, j);
+      const auto set = [&](MassColumns& columns, const Vec3& linear, const Vec3& angular) {
+        const Vec3 f = X_IL.R * linear;
+        columns.col(4 * i + j) << f, X_IL.R * angular + X_IL.p.cross(f);
+      };
+      set(momentum, m.mass * moves + turns.cross(m.s), m.I * turns + m.s.cross(moves));
+      set(weight, m.mass * g, m.s.cross(g));
+    }
+  }
+}
+
+RobotModel MassRegressor::changed(const MassVector& parameters) const noexcept {
+  RobotModel out = robot_;
+  for (int i = 0; i < count_; ++i) {
+    const RigidBody& body = body_[static_cast<std::size_t>(i)];
+    Moments sum = momentsOf(body);
+    for (int j = 0; j < 4; ++j) {
+      const Moments m = momentsPer(body, j);
+      const double by = parameters(4 * i + j);
+      sum.mass += by * m.mass;
+      sum.s += by * m.s;
+      sum.I += by * m.I;
+    }
+    const Vec3 c = sum.s / sum.mass;
+    out.bodyOf(links_[static_cast<std::size_t>(i)]) = {
+        sum.mass, c, sum.I - sum.mass * (c.squaredNorm() * Mat3::Identity() - c * c.transpose())};
+  }
+  return out;
+}
+
+}  // namespace ves
