@@ -228,9 +228,16 @@ void ControllerTickLearningAided(benchmark::State& state) {
              {"controller.compensation.adaptation=true", "controller.compensation.wrench=aided"});
   tick(state, set);
 }
+void ControllerTickLearningMasses(benchmark::State& state) {
+  std::vector<std::string> set = kCompensated;
+  set.insert(set.end(), {"controller.compensation.wrench=aided",
+                         "controller.compensation.learns_masses=true"});
+  tick(state, set);
+}
 BENCHMARK(ControllerTick);
 BENCHMARK(ControllerTickCompensated);
 BENCHMARK(ControllerTickLearningAided);
+BENCHMARK(ControllerTickLearningMasses);
 
 /// Each tick by itself, in the closed loop: median and 99.9th percentile, the clock's reading
 /// included.
