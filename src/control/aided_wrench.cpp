@@ -199,6 +199,10 @@ void AidedWrench::take(const Input& in, const Vec6& residual) noexcept {
 }
 
 void AidedWrench::endGroup(const Input& in) noexcept {
+  if (!(group_time_ > 0.0)) {  // samples that name one time
+    restart();
+    return;
+  }
   lesson_.group_ends = true;
   const Sum& last = sums_[groups_++ % sums_.size()];
   Sum& sum = sums_[groups_ % sums_.size()];
@@ -258,8 +262,9 @@ void AidedWrench::open(const MassBelief& before, int samples) noexcept {
 /// The model has what is believed now, within reason.
 void AidedWrench::use() noexcept {
   if (prior_.size() == 0) return;
-  constexpr double kMost = 6.0;  // [-] deviations
-  const MassVector next = belief_.parameters().cwiseMin(kMost * prior_).cwiseMax(-kMost * prior_);
+  constexpr double kMost = 6.0, kLeast = 0.1;  // [-] deviations; of a body's mass
+  MassVector next = belief_.parameters().cwiseMin(kMost * prior_).cwiseMax(-kMost * prior_);
+  for (Eigen::Index i = 0; i < next.size(); i += 4) next(i) = std::max(next(i), kLeast - 1.0);
   if (next == used_) return;
   lesson_.learnt = next - used_;
   used_ = next;
