@@ -349,8 +349,7 @@ INSTANTIATE_TEST_SUITE_P(
             "controller.compensation.adaptation: needs the observer, want 'observer: true'"},
         Bad{"learning_without_a_model", "z_sine", "controller.compensation.learns_masses=true",
             "controller.compensation.learns_masses: needs the robot's model beside the sensor, "
-            "want "
-            "'wrench: aided'"},
+            "want 'wrench: aided'"},
         Bad{"aided_without_inertia", "z_sine", "controller.compensation.wrench=aided",
             "'aided' needs the robot's inertia taken out, want 'inertia: true'"},
         Bad{"wrench_choice", "z_sine", "controller.compensation.wrench=clean",

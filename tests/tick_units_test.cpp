@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 
 #include "support/rig.hpp"
 #include "ves/control/robot_load.hpp"
@@ -279,6 +280,25 @@ TEST(StaticLoad, GoesThroughTheSensorsFilterByTheShareOnly) {
   EXPECT_EQ(published.counts(), all.counts());  // unfiltered: what the frozen check expects
   for (int n = 0; n < 200; ++n) all.update(known, q, tilted, 0.01, true, 1.0);
   EXPECT_LT((published.wrench().stacked() - all.wrench().stacked()).norm(), 1e-6);
+}
+
+// A joint angle that is none spoils its own tick, and none after it, whatever is learnt meanwhile.
+TEST(StaticLoad, ForgetsAnAngleThatIsNone) {
+  ControllerConfig config = puma();
+  config.compensation.inertia = config.compensation.observer = true;
+  KnownPayload known(config);
+  StaticLoad load(config);
+  const JointVector q = JointVector::Zero();
+  const auto update = [&](const JointVector& at) {
+    known.update({}, -1);
+    load.update(known, at, Mat3::Identity(), 0.01, true, 1.0);
+  };
+  load.update(known, q, Mat3::Identity(), 0.01, false, 1.0);
+  update(JointVector::Constant(std::numeric_limits<double>::quiet_NaN()));
+  known.learn(config.payload.robot);
+  update(q);
+  EXPECT_TRUE(known.learnt());
+  EXPECT_TRUE(load.wrench().stacked().allFinite());
 }
 
 TEST(KnownPayload, IsToldAtItsTimeOfItsSegmentAndOfNothingElse) {

@@ -39,8 +39,7 @@ void KnownPayload::learn(const RobotModel& robot) noexcept {
 }
 
 void KnownPayload::take() noexcept {
-  payload_.robot =
-      in_hand_.body.mass > 0.0 ? withLoad(empty_, in_hand_.link, in_hand_.body) : empty_;
+  payload_.robot = withLoad(empty_, in_hand_.link, in_hand_.body);
   before_ = carried_;
   carried_ = ves::carried(payload_);
 }
@@ -56,10 +55,10 @@ void StaticLoad::update(const KnownPayload& known, const JointVector& q, const M
                         double since, bool engaged, double share) noexcept {
   F_So_S_ = staticWrench(known.payload(), q, R_IP, gravity_);
   const Vec6 weight = F_So_S_.stacked();
-  if (known.learnt()) filter_.raise((weight - weight_).array());
-  weight_ = weight;
   counts_ = S_proc_ * weight;
   if (!filters_ || !weight.allFinite()) return;
+  if (known.learnt()) filter_.raise((weight - weight_).array());
+  weight_ = weight;
   if (!engaged) {
     filter_.settle(weight.array());
     felt_ = weight;

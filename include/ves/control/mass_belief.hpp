@@ -32,9 +32,6 @@ class MassBelief {
 
   auto parameters() const noexcept { return x_.head(size()); }
   Vec6 bias() const noexcept { return x_.segment<6>(size()); }  // [count] beyond what is taken out
-  MassVector deviations() const noexcept {
-    return P_.diagonal().head(size()).cwiseMax(0.0).cwiseSqrt();
-  }
 
   /// The bias that is taken out has changed by so much. [count]
   void moveBias(const Vec6& by) noexcept { x_.segment<6>(size()) -= by; }
