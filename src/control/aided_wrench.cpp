@@ -48,29 +48,25 @@ ResidualGate::ResidualGate(const ControllerConfig& config) : deviations_(config.
 
 namespace {
 
-/// [count^2] of the sensor in the mean of n samples. Behind the sensor's filter they are not quite
-/// independent: the calibration's mean says by how much less a mean tells. The six channels have
-/// the same filter.
-Vec6 sensorVariance(int n, const ResidualNoise& noise) {
+/// [count^2] of the sensor and the attitude in the mean of n samples. Behind the sensor's filter
+/// they are not quite independent: the calibration's mean says by how much less a mean tells. The
+/// six channels have the same filter.
+Vec6 variance(int n, const ResidualNoise& noise) {
   const double total = noise.once.sum();
   const double correlation =
       n > 1 && total > 0.0 ? std::max(1.0, kCalibrationSamples * noise.mean.sum() / total) : 1.0;
   // Where no noise dithers them, what a count leaves out stays the same from sample to sample.
   const auto undithered = (-4.0 * M_PI * M_PI * noise.once.array()).exp() / 12.0;
-  return correlation / n * noise.once + undithered.matrix();
+  return correlation / n * noise.once + undithered.matrix() + noise.weight;
 }
 
 }  // namespace
 
 bool ResidualGate::exceeds(std::size_t i, const Vec6& mean, const ResidualNoise& noise,
                            const Vec6& unknown) const noexcept {
-  const Vec6 variance = sensorVariance(kMeans[i], noise) + noise.weight + unknown;
-  const Vec6 most = deviations_ * variance.cwiseSqrt() + felt_[i] * noise.legs;
+  const Vec6 most =
+      deviations_ * (variance(kMeans[i], noise) + unknown).cwiseSqrt() + felt_[i] * noise.legs;
   return !(mean.cwiseAbs().array() <= most.array()).all();
-}
-
-Vec6 ResidualGate::variance(std::size_t i, const ResidualNoise& noise) noexcept {
-  return sensorVariance(kMeans[i], noise) + noise.weight;
 }
 
 AidedWrench::AidedWrench(const ControllerConfig& config)
@@ -116,7 +112,7 @@ Wrench AidedWrench::update(const Input& in, bool engaged) noexcept {
     constexpr std::int64_t kRefresh = 100;  // [-] samples: attitude and joints change slowly
     if (residuals_++ % kRefresh == 0) refreshNoise(in);
     const Wrench residual = in.measured - in.joints.shown(in.robot.platform().w);
-    take(in, countsPerWrench(in.X_IP.R) * residual.stacked());
+    take(in, countsPerWrench(in.X_IP.R), residual);
   }
   if (!withholds_) return in.measured;
   lesson_.withheld = Wrench::from(in.share * (in.measured - reaction_).stacked());
@@ -142,8 +138,7 @@ void AidedWrench::calibrate(const Input& in) noexcept {
   MassColumns columns;
   columns.noalias() = countsPerWrench(in.X_IP.R) * weight;
   refreshNoise(in);
-  belief_.learnAtRest(columns, columns * used_,
-                      sensorVariance(kCalibrationSamples, noise_) + noise_.weight);
+  belief_.learnAtRest(columns, columns * used_, variance(kCalibrationSamples, noise_));
   restart();
 }
 
@@ -157,8 +152,9 @@ void AidedWrench::restart() noexcept {
   beliefs_[0] = belief_;
 }
 
-/// A new sample's residual. [count]
-void AidedWrench::take(const Input& in, const Vec6& residual) noexcept {
+/// A new sample's residual.
+void AidedWrench::take(const Input& in, const Mat6& counts_per_wrench,
+                       const Wrench& residual) noexcept {
   const BodyMotion& P = in.robot.platform();
   const double since = in.samples.wrench().since;
   const Vec6 twist = (Vec6() << P.v, P.w).finished();
@@ -170,14 +166,13 @@ void AidedWrench::take(const Input& in, const Vec6& residual) noexcept {
   const Vec6 felt = twist_.output().matrix();
   regressor_.evaluate(X_PL0_, gravity_,
                       {in.X_IP.R, felt.head<3>(), felt.tail<3>(), in.joints.q(), in.joints.q_dot()},
-                      momentum_, weight_);
-  lesson_.momentum = momentum_;
+                      lesson_.momentum, weight_);
   open_ = std::max(0, open_ - 1);
   withholds_ = open_ == 0;
   if (!withholds_) return;
-  const Vec6 beyond = weight_ * (belief_.parameters() - used_);
-  const Vec6 left =
-      residual + in.bias.learnt() - belief_.bias() - countsPerWrench(in.X_IP.R) * beyond;
+  const Vec6 y = counts_per_wrench * residual.stacked() + in.bias.learnt(),
+             beyond = weight_ * (belief_.parameters() - used_),
+             left = y - belief_.bias() - counts_per_wrench * beyond;
   if (gate_.exceeds(0, left, noise_, unknown_)) {
     open(belief_, std::max(0, in_group_) + 1);
     return;
@@ -188,17 +183,17 @@ void AidedWrench::take(const Input& in, const Vec6& residual) noexcept {
     in_group_ = 0;
     residual_sum_.setZero();
     group_time_ = 0.0;
-    momentum_before_ = momentum_;
+    momentum_before_ = lesson_.momentum;
     weight_before_ = weight_;
     lesson_.group_ends = true;  // where it begins
   } else {
-    residual_sum_ += residual + in.bias.learnt();
+    residual_sum_ += y;
     group_time_ += since;
-    if (++in_group_ == Lesson::kGroup) endGroup(in);
+    if (++in_group_ == Lesson::kGroup) endGroup(counts_per_wrench);
   }
 }
 
-void AidedWrench::endGroup(const Input& in) noexcept {
+void AidedWrench::endGroup(const Mat6& counts_per_wrench) noexcept {
   if (!(group_time_ > 0.0)) {  // samples that name one time
     restart();
     return;
@@ -207,8 +202,8 @@ void AidedWrench::endGroup(const Input& in) noexcept {
   const Sum& last = sums_[groups_++ % sums_.size()];
   Sum& sum = sums_[groups_ % sums_.size()];
   MassColumns one;
-  one.noalias() = countsPerWrench(in.X_IP.R) *
-                  (0.5 * (weight_before_ + weight_) - (momentum_ - momentum_before_) / group_time_);
+  one.noalias() = counts_per_wrench * (0.5 * (weight_before_ + weight_) -
+                                       (lesson_.momentum - momentum_before_) / group_time_);
   sum.columns = last.columns + one;
   sum.y = last.y + residual_sum_ / Lesson::kGroup;
   sum.y.noalias() += one * used_;
@@ -216,7 +211,7 @@ void AidedWrench::endGroup(const Input& in) noexcept {
   residual_sum_.setZero();
   group_time_ = 0.0;
   in_group_ = 0;
-  momentum_before_ = momentum_;
+  momentum_before_ = lesson_.momentum;
   weight_before_ = weight_;
   unknown_ = belief_.variance(one);
   if (isForce(1, belief_)) return;
@@ -232,7 +227,8 @@ void AidedWrench::endGroup(const Input& in) noexcept {
   const double block_time = sum.time - before.time;
   constexpr double kShare = 1.0 / static_cast<double>(kGroupsOfBlock);
   belief_.learn(kShare * (sum.columns - before.columns), kShare * (sum.y - before.y),
-                ResidualGate::variance(2, noise_), legsMomentum(), block_time);
+                variance(static_cast<int>(kGroupsOfBlock) * Lesson::kGroup, noise_), legsMomentum(),
+                block_time);
   beliefs_[(block + 1) % kBlocks] = belief_;
   use();
 }

@@ -37,8 +37,6 @@ class ResidualGate {
   /// of masses and bias.
   bool exceeds(std::size_t i, const Vec6& mean, const ResidualNoise& noise,
                const Vec6& unknown) const noexcept;
-  /// [count^2] of the sensor and the attitude in the mean over kMeans[i] samples.
-  static Vec6 variance(std::size_t i, const ResidualNoise& noise) noexcept;
 
  private:
   double deviations_;                         // [-]
@@ -89,12 +87,12 @@ class AidedWrench {
     Vec6 y = Vec6::Zero();
     double time = 0.0;  // [s]
   };
-  static constexpr std::size_t kGroupsOfBlock = 4;  // what is learnt from
-  static constexpr std::size_t kGroups = 40, kBlocks = kGroups / kGroupsOfBlock;  // at most
+  static constexpr std::size_t kGroupsOfBlock = 4;                          // what is learnt from
+  static constexpr std::size_t kBlocks = Lesson::kGroups / kGroupsOfBlock;  // at most
 
   void calibrate(const Input& in) noexcept;
-  void take(const Input& in, const Vec6& residual) noexcept;
-  void endGroup(const Input& in) noexcept;
+  void take(const Input& in, const Mat6& counts_per_wrench, const Wrench& residual) noexcept;
+  void endGroup(const Mat6& counts_per_wrench) noexcept;
   bool isForce(std::size_t mean, const MassBelief& before) noexcept;
   void open(const MassBelief& before, int samples) noexcept;
   void restart() noexcept;
@@ -128,13 +126,13 @@ class AidedWrench {
   bool begun_ = false, taking_ = false;  // a calibration
   bool taught_ = false;
 
-  MassColumns momentum_, weight_;                // of the newest sample, about Po in I
+  MassColumns weight_;                           // of the newest sample, about Po in I
   MassColumns momentum_before_, weight_before_;  // as the group began
   Vec6 residual_sum_ = Vec6::Zero();
-  double group_time_ = 0.0;              // [s]
-  int in_group_ = 0;                     // [-] samples; -1: nothing is known of the time before it
-  Vec6 unknown_ = Vec6::Zero();          // [count^2] of a group
-  std::array<Sum, kGroups + 1> sums_{};  // a ring, the newest at groups_
+  double group_time_ = 0.0;      // [s]
+  int in_group_ = 0;             // [-] samples; -1: nothing is known of the time before it
+  Vec6 unknown_ = Vec6::Zero();  // [count^2] of a group
+  std::array<Sum, Lesson::kGroups + 1> sums_{};  // a ring, the newest at groups_
   std::size_t groups_ = 0;
   std::array<MassBelief, kBlocks> beliefs_{};  // before each block, a ring
   int open_ = 0;                               // [-] samples to come

@@ -12,7 +12,8 @@ namespace ves {
 
 /// What a tick has found out.
 struct Lesson {
-  static constexpr int kGroup = 5;  // [-] samples that are looked at together
+  static constexpr int kGroup = 5;            // [-] samples that are looked at together
+  static constexpr std::size_t kGroups = 40;  // [-] of the longest time that is looked at
 
   MassColumns momentum;  // [N s, N m s] of the robot per parameter, about Po in I
   MassVector learnt;     // by how much parameters are other than was believed; empty: nothing
@@ -34,7 +35,7 @@ class Hindsight {
   bool any() const noexcept { return any_; }
 
  private:
-  static constexpr std::size_t kKept = 41;  // [-] groups that may be replayed, and one
+  static constexpr std::size_t kKept = Lesson::kGroups + 1;  // [-] ends of groups
 
   using Modes = ModalDynamics::Modes;
   using Sensitivity =
