@@ -206,8 +206,7 @@ TEST(JointMomentum, AnglesThatAreOlderBeginAnew) {
 /// [count] deviations of 5, the mean of a calibration independent samples' mean.
 ResidualNoise noiseOfFive() {
   ResidualNoise n;
-  n.once.setConstant(25.0);
-  n.mean.setConstant(25.0 / kCalibrationSamples);
+  n.sensor.variance.setConstant(25.0);
   return n;
 }
 

@@ -55,6 +55,24 @@ TEST(ForceMeasurement, UndoesSensorAndFrames) {  // (2.6) forward, (C.1) back
   }
 }
 
+// Covariance is of what a count in each channel makes of the wrench, by the measurement itself.
+TEST(ForceMeasurement, TurnsTheNoiseOfItsChannelsWithIt) {
+  const ForceSensor& sensor = test::puma().sensor;
+  const Mat3 R_IP = rotation(Vec3(0.3, -0.2, 1.1));
+  SensorNoise noise;
+  noise.variance << 4.0, 9.0, 1.0, 0.0, 25.0, 2.0;
+  noise.correlation = 2.5;
+  const Vec6 none = forceMeasurement(sensor, Vec6::Zero(), {}, R_IP).stacked();
+  Mat6 expected = Mat6::Zero();
+  for (int i = 0; i < 6; ++i) {
+    AdcCounts one{};
+    one[static_cast<std::size_t>(i)] = 1;
+    const Vec6 d = forceMeasurement(sensor, Vec6::Zero(), one, R_IP).stacked() - none;
+    expected += 2.5 * noise.variance(i) * d * d.transpose();
+  }
+  EXPECT_LT((wrenchNoise(sensor, noise, R_IP) - expected).norm(), 1e-12 * expected.norm());
+}
+
 TEST(ChannelStatistics, GivesMeanAndStandardDeviation) {
   ChannelStatistics calibration;
   std::mt19937 random(2);

@@ -41,6 +41,15 @@ TEST(WrenchFilter, IsAFirstOrderLowPass) {
   }
 }
 
+TEST(WrenchFilter, LosesTheNoiseOfADeadBandOnly) {
+  WrenchFilterSettings s;
+  s.dead_band(1) = 0.5;
+  s.low_pass(2) = 1.0;
+  const Mat6 out = WrenchFilter(s, 0.01).noise(Mat6::Constant(2.0));
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j < 6; ++j) EXPECT_EQ(out(i, j), i == 1 || j == 1 ? 0.0 : 2.0) << i << j;
+}
+
 TEST(WrenchFilter, LetsWhatIsNoNumberThroughAndForgetsIt) {
   WrenchFilterSettings settings;
   settings.low_pass.setConstant(1.0);

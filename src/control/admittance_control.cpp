@@ -65,8 +65,9 @@ const PathPoint<6>& AdmittanceControl::step(const AdmittanceInput& in, const Vec
     const double for_change =
         change_.damping() > 0.0 ? model_.damped() * (change_.damping() / damping) : 0.0;
     change_.pay(for_change);
-    energy_.take(model_.taken(in.F_Po_I), port_.take(in.at_port, in.wrench.time, in.X_IP, in.servo),
-                 model_.damped() - for_change, model_.kineticEnergy());
+    energy_.take({model_.taken(in.F_Po_I), model_.takenOfNoise(in.noise), model_.dissipated(),
+                  model_.damped() - for_change, model_.kineticEnergy()},
+                 port_.take(in.at_port, in.wrench.time, in.X_IP, in.servo));
     const SafetyLimits& limits = checks.limits();
     const bool held = scale_ < 1.0 && model_.kineticEnergy() > limits.growth_floor;
     oscillation_.take(limits, model_.energy(), held, in.q, joint_moves_, period_);

@@ -142,9 +142,10 @@ ModalDynamics ModalDynamics::scaled(const VehicleFactors& f) const noexcept {
 /// Woodbury: (1 + Phi^T M_1 Phi)^-1 = 1 - Phi^T (1 + M_1 Phi Phi^T)^-1 M_1 Phi.
 ModalDynamics::Body ModalDynamics::body(const Mat6& M_1) const noexcept {
   const Mat6 left = Mat6::Identity() + M_1.lazyProduct(compliance_);
-  const Mat6 X = left.inverse().lazyProduct(M_1);
+  const Mat6 inverse = left.inverse(), X = inverse.lazyProduct(M_1);
   Body out;
   out.pull = X.lazyProduct(Phi_);
+  out.mobility = compliance_.lazyProduct(inverse);
   return out;
 }
 
@@ -239,6 +240,8 @@ void AdmittanceModel::reset(const Vec6& x, const Mat6& M_1, double ahead) noexce
 
 void AdmittanceModel::step(const Wrench& F_Po_I, double damping) noexcept {
   before_ = now_;
+  dt_ = period_;
+  mobility_ = dynamics_.mobility();
   ModalDynamics::Forces u;  // Phi^T F
   u.noalias() = dynamics_.Phi().transpose() * F_Po_I.stacked();
   u /= factors_.mass;
@@ -268,6 +271,8 @@ void AdmittanceModel::step(const Wrench& F_Po_I, const Carried& carried, double 
   lost -= carried.M_1.rightCols<3>() * (E_ * angleRates(before_.modes));
   const Mat6 M_1_per_mass = working(carried.M_1) / factors_.mass;
   const ModalDynamics::Body body = dynamics_.body(M_1_per_mass);
+  dt_ = dt;
+  mobility_ = body.mobility;
   before_.modes.eta_dot =
       dynamics_.afterBlow(body, before_.modes.eta_dot, working(Wrench::from(lost)) / factors_.mass);
 

@@ -48,16 +48,11 @@ ResidualGate::ResidualGate(const ControllerConfig& config) : deviations_(config.
 
 namespace {
 
-/// [count^2] of the sensor and the attitude in the mean of n samples. Behind the sensor's filter
-/// they are not quite independent: the calibration's mean says by how much less a mean tells. The
-/// six channels have the same filter.
+/// [count^2] of the sensor and the attitude in the mean of n samples.
 Vec6 variance(int n, const ResidualNoise& noise) {
-  const double total = noise.once.sum();
-  const double correlation =
-      n > 1 && total > 0.0 ? std::max(1.0, kCalibrationSamples * noise.mean.sum() / total) : 1.0;
   // Where no noise dithers them, what a count leaves out stays the same from sample to sample.
-  const auto undithered = (-4.0 * M_PI * M_PI * noise.once.array()).exp() / 12.0;
-  return correlation / n * noise.once + undithered.matrix() + noise.weight;
+  const auto undithered = (-4.0 * M_PI * M_PI * noise.sensor.variance.array()).exp() / 12.0;
+  return noise.sensor.ofMean(n) + undithered.matrix() + noise.weight;
 }
 
 }  // namespace
@@ -285,8 +280,7 @@ Mat6 AidedWrench::countsPerWrench(const Mat3& R_IP) const noexcept {
 
 /// A leg whose length is taken wrongly turns the weight; one whose acceleration is, the inertia.
 void AidedWrench::refreshNoise(const Input& in) noexcept {
-  noise_.once = in.bias.deviation().cwiseAbs2();
-  noise_.mean = in.bias.standardError().cwiseAbs2();
+  noise_.sensor = in.bias.noise();
   noise_.weight.setZero();
   noise_.legs.setZero();
   const Mat6& M_1 = in.robot.M_1();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/control/force_measurement.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace ves {
@@ -23,6 +24,13 @@ Wrench forceMeasurement(const ForceSensor& sensor, const Vec6& bias, const AdcCo
   const Wrench F_So_S = sensorWrench(sensor, bias, adc);
   const Wrench F_Po_P = transfer(sensor.X_PS, F_So_S);
   return rotate(R_IP, F_Po_P);
+}
+
+Mat6 wrenchPerCount(const ForceSensor& sensor, const Mat3& R_IP) noexcept {
+  Mat6 out;
+  for (int i = 0; i < 6; ++i)
+    out.col(i) = rotate(R_IP, transfer(sensor.X_PS, Wrench::from(sensor.C_proc.col(i)))).stacked();
+  return out;
 }
 
 void ChannelStatistics::add(const AdcCounts& adc, const Vec6& load) noexcept {
@@ -50,6 +58,21 @@ Vec6 ChannelStatistics::standardError() const noexcept {
   const int batches = n_ / kBatchSize;
   if (batches < 2) return Vec6::Zero();
   return (batch_m2_ / ((batches - 1) * batches)).cwiseSqrt();
+}
+
+Mat6 wrenchNoise(const ForceSensor& sensor, const SensorNoise& noise, const Mat3& R_IP) noexcept {
+  const Mat6 J = wrenchPerCount(sensor, R_IP);
+  const Vec6 variance = noise.correlation * noise.variance;
+  const Mat6 right = variance.asDiagonal() * J.transpose();
+  return J.lazyProduct(right);
+}
+
+SensorNoise noiseOf(const ChannelStatistics& statistics) noexcept {
+  SensorNoise out;
+  out.variance = statistics.deviation().cwiseAbs2();
+  const double once = out.variance.sum(), mean = statistics.standardError().squaredNorm();
+  if (once > 0.0) out.correlation = std::max(1.0, kCalibrationSamples * mean / once);
+  return out;
 }
 
 void Calibration::begin() noexcept {

@@ -47,6 +47,7 @@ void SensorBias::calibrate(const Sample& sample, bool fresh, const Vec6& static_
   learnt_.setZero();
   deviation_ = calibration_.statistics().deviation();
   standard_error_ = calibration_.statistics().standardError();
+  noise_ = noiseOf(calibration_.statistics());
 }
 
 }  // namespace ves

@@ -87,11 +87,16 @@ Waypoint<6> TestPlatform::nextMotion(const Wrenches& W) noexcept {
   if (supervisor_.stopped()) motion_.hold();
   if (supervisor_.runs(motion_, SegmentKind::kCalibration))
     bias_.calibrate(sample, samples_.fresh(), load_.counts());
-  if (supervisor_.runs(motion_, SegmentKind::kAdmittance))
+  if (supervisor_.runs(motion_, SegmentKind::kAdmittance)) {
+    const Transform& X_IP = legs_.measured().X_IP;
+    const Mat6 noise = aided_.withholds()
+                           ? Mat6(Mat6::Zero())
+                           : filter_.noise(wrenchNoise(config_.sensor, bias_.noise(), X_IP.R));
     return motion_.admittanceModel(
-        {W.dynamic, W.felt, robot_.M_1(), robot_.before(), share_.value(), samples_.wrench(),
-         aided_.lesson(), sample.q, commander_.legs().L, legs_.measured().X_IP, legs_.servo()},
+        {W.dynamic, W.felt, noise, robot_.M_1(), robot_.before(), share_.value(), samples_.wrench(),
+         aided_.lesson(), sample.q, commander_.legs().L, X_IP, legs_.servo()},
         safety_.path());
+  }
   if (supervisor_.moves()) return motion_.trajectoryGeneration();
   // Until the legs follow, they are where they are measured.
   const bool at_measured = supervisor_.disarmed() ||

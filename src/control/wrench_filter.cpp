@@ -29,4 +29,9 @@ Wrench WrenchFilter::update(const Wrench& F_Po_I) noexcept {
   return Wrench::from(out);
 }
 
+Mat6 WrenchFilter::noise(const Mat6& covariance) const noexcept {
+  const Vec6 passes = (settings_.dead_band.array() > 0.0).select(Vec6::Zero(), Vec6::Ones());
+  return passes.asDiagonal() * covariance * passes.asDiagonal();
+}
+
 }  // namespace ves

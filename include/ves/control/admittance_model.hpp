@@ -75,6 +75,7 @@ class ModalDynamics {
   /// u, the left-hand side of (3.11).
   struct Body {
     Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, kMaxModes> pull;  // wrench per -eta''(free)
+    Mat6 mobility;  // [1/kg] acceleration per wrench at Po
   };
   Body body(const Mat6& M_1) const noexcept;
   /// eta' of base and body after a blow at Po in I [N s, N m s], of a base of mass 1.
@@ -98,8 +99,13 @@ class ModalDynamics {
   Modes atRest() const;
   /// [J] the modes are mass-normalised.
   double potentialEnergy(const Modes& m) const noexcept { return 0.5 * k_.dot(m.eta.cwiseAbs2()); }
-  const auto& Phi() const noexcept { return Phi_; }      // 6 x k
-  const auto& stiffness() const noexcept { return k_; }  // k, [1/s^2]
+  /// [W] at such a speed.
+  double dissipation(const Vector<kMaxModes>& eta_dot) const noexcept {
+    return coupled_ ? eta_dot.dot(damping_ * eta_dot) : c_.dot(eta_dot.cwiseAbs2());
+  }
+  const auto& Phi() const noexcept { return Phi_; }              // 6 x k
+  const Mat6& mobility() const noexcept { return compliance_; }  // [1/kg] without a body
+  const auto& stiffness() const noexcept { return k_; }          // k, [1/s^2]
   bool coupled() const noexcept { return coupled_; }
   Eigen::Index size() const noexcept { return k_.size(); }
 
@@ -178,6 +184,18 @@ class AdmittanceModel {
   double taken(const Wrench& F_Po_I) const noexcept {
     return working(F_Po_I).dot(dynamics_.Phi() * (now_.modes.eta - before_.modes.eta));
   }
+  /// [J] that the base's own damping took in it, the speed taken as a line.
+  double dissipated() const noexcept {
+    const auto &from = before_.modes.eta_dot, &to = now_.modes.eta_dot;
+    return factors_.mass * dt_ / 6.0 *
+           (dynamics_.dissipation(from) + dynamics_.dissipation(from + to) +
+            dynamics_.dissipation(to));
+  }
+  /// [J] that a step takes on average of noise in F_Po_I, of this covariance: of the speed that a
+  /// wrench leads to in a step, the next steps have all, this one half.
+  double takenOfNoise(const Mat6& covariance) const noexcept {
+    return 0.5 * dt_ * dt_ / factors_.mass * covariance.cwiseProduct(mobility_).sum();
+  }
   double damped() const noexcept {
     return -factors_.mass * damping_.dot(now_.modes.eta - before_.modes.eta);
   }
@@ -211,7 +229,9 @@ class AdmittanceModel {
   ModalDynamics dynamics_;
   VehicleFactors factors_;
   Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::RowMajor, kMaxModes, 6> Phi_pinv_;
-  double period_ = 0.0;  // [s]
+  double period_ = 0.0;           // [s]
+  double dt_ = 0.0;               // [s] of the last step
+  Mat6 mobility_ = Mat6::Zero();  // [1/kg] in it: acceleration per wrench, per mass
   Hold step_;
   State now_, before_;             // before the last step
   ModalDynamics::Forces damping_;  // in the last step, per mass

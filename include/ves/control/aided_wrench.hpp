@@ -18,8 +18,7 @@ double largestFelt(const ServoModel& servo, double period, std::size_t samples);
 
 /// What a residual may be without a force, by channel.
 struct ResidualNoise {
-  Vec6 once = Vec6::Zero();    // [count^2] variance of one sample, from the sensor
-  Vec6 mean = Vec6::Zero();    // [count^2] of its mean over a calibration: how far the bias is off
+  SensorNoise sensor;
   Vec6 weight = Vec6::Zero();  // [count^2] from the attitude by rounded lengths, turning the weight
   Vec6 legs = Vec6::Zero();    // [count s] of a leg that takes its next count sooner or later than
                                // modelled, and so goes K count quicker; per [1/s] of largestFelt()

@@ -8,9 +8,10 @@
 // platform, which is late. The difference of the two is energy that the emulation injects.
 //
 // The tank is De Stefano, Balachandran and Secchi's (IEEE T-RO 36(1), 2020): filled to its reserve
-// at most, it is emptied by what is put in, as soon as that is known; below zero the model's modes
-// are damped, all alike, until they have paid. The damping acts on the model and grows and fades
-// over several ticks, so that the command stays smooth.
+// at most, also by what the base's own damping takes, it is emptied by what is put in, as soon as
+// that is known; below zero the model's modes are damped, all alike, until they have paid. The
+// damping acts on the model and grows and fades over several ticks, so that the command stays
+// smooth.
 #pragma once
 
 #include <algorithm>
@@ -25,15 +26,23 @@ inline double dampingSlew(double most, double period) noexcept {
   return most * std::min(1.0, period / kRise);
 }
 
+/// [J] of the admittance model, in a step.
+struct ModelWork {
+  double taken = 0.0;  // of the wrench
+  double noise = 0.0;  // of that, on average, of the sensor's noise, which is no work of anybody
+  double dissipated = 0.0;  // by the base's own damping
+  double paid = 0.0;        // by damping that was added to pay
+  double kinetic = 0.0;     // that is in its motion now
+};
+
 class EnergyAccount {
  public:
   explicit EnergyAccount(const ControllerConfig& config) noexcept;
 
   void reset() noexcept;
 
-  /// One step of admittance control: `taken` [J] is what the model took of the wrench, `paid` [J]
-  /// what damping took of the model, `kinetic` [J] what is in its motion.
-  void take(double taken, const PortWork::Work& work, double paid, double kinetic) noexcept;
+  /// One step of admittance control.
+  void take(const ModelWork& model, const PortWork::Work& work) noexcept;
 
   /// [J] up to the reading before the last, paid or not.
   double putIn() const noexcept { return put_in_; }

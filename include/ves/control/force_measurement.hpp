@@ -20,6 +20,8 @@ Wrench sensorWrench(const ForceSensor& sensor, const Vec6& bias, const AdcCounts
 /// F_Po_I: bias removed, crosstalk undone, {S} to {P}, turned to inertial axes.
 Wrench forceMeasurement(const ForceSensor& sensor, const Vec6& bias, const AdcCounts& adc,
                         const Mat3& R_IP) noexcept;
+/// [N | N m per count] F_Po_I = this (counts - bias).
+Mat6 wrenchPerCount(const ForceSensor& sensor, const Mat3& R_IP) noexcept;
 
 /// How much may change while the machine counts as still.
 struct StillnessLimits {
@@ -54,6 +56,21 @@ class ChannelStatistics {
   Vec6 batch_mean_ = Vec6::Zero();  // of the batches
   Vec6 batch_m2_ = Vec6::Zero();
 };
+
+/// Of the six channels, which have the same filter.
+struct SensorNoise {
+  Vec6 variance = Vec6::Zero();  // [count^2] of one sample
+  /// [-] By how much less a mean tells than of independent samples: behind the filter they are not
+  /// quite.
+  double correlation = 1.0;
+
+  /// [count^2] Of the mean of n samples in a row.
+  Vec6 ofMean(int n) const noexcept { return (n > 1 ? correlation / n : 1.0) * variance; }
+};
+/// [N^2 | N^2 m | N^2 m^2] Covariance of F_Po_I, a sample's part in a mean over many.
+Mat6 wrenchNoise(const ForceSensor& sensor, const SensorNoise& noise, const Mat3& R_IP) noexcept;
+/// As a calibration found it.
+SensorNoise noiseOf(const ChannelStatistics& statistics) noexcept;
 
 /// The calibration routine (report, 2.3): the bias of each channel over 100 samples at rest. Starts
 /// again whenever something moves, and gives up after kPatience samples.

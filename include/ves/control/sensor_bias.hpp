@@ -68,6 +68,7 @@ class SensorBias {
   const Calibration& calibration() const noexcept { return calibration_; }
   bool calibrated() const noexcept { return calibrated_; }  // once at least
   /// Of the last calibration that succeeded. [count]
+  const SensorNoise& noise() const noexcept { return noise_; }
   const Vec6& deviation() const noexcept { return deviation_; }
   const Vec6& standardError() const noexcept { return standard_error_; }
 
@@ -76,6 +77,7 @@ class SensorBias {
   Calibration calibration_;
   Vec6 found_, learnt_ = Vec6::Zero();
   bool calibrated_ = false;
+  SensorNoise noise_;
   Vec6 deviation_ = Vec6::Zero(), standard_error_ = Vec6::Zero();
 };
 

@@ -28,6 +28,10 @@ class WrenchFilter {
   Wrench update(const Wrench& F_Po_I) noexcept;
   void reset() noexcept { begun_ = false; }
 
+  /// Of noise of this covariance. What a low-pass takes from it in a sample it spreads over others;
+  /// in a dead band it is lost.
+  Mat6 noise(const Mat6& covariance) const noexcept;
+
  private:
   WrenchFilterSettings settings_;
   Vec6 passes_;
