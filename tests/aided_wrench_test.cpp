@@ -326,7 +326,7 @@ TEST(AidedWrench, KnowsWhatRoundedLegsMakeOfWeightAndInertia) {
   RobotInertia inertia(c);
   inertia.update(KnownPayload(c), 0, q, 0.0, X_IP, standing, true, 1.0);
   joints.reset(q);
-  aided.update({Wrench{}, static_wrench, inertia, joints, samples, bias, X_IP, 1.0}, true);
+  aided.update({Wrench{}, static_wrench, inertia, joints, samples, bias, X_IP, 1.0, false}, true);
   EXPECT_LT((aided.noise().weight - weight).norm(), 1e-4 * weight.norm());
   EXPECT_LT((aided.noise().legs - legs.cwiseSqrt()).norm(), 1e-4 * legs.cwiseSqrt().norm());
 }

@@ -302,6 +302,56 @@ TEST_F(Emulation, MassesThatAreTenPercentOffAreLearnt) {
       }
 }
 
+/// An arm that takes 3 kg in hand at 6 s and swings back later; `events` besides.
+Experiment takesALoad(const std::string& scenario, const std::string& swing, double to, double back,
+                      const std::string& events) {
+  return experiment(
+      scenario, with(kCompensated, kAidedWrench),
+      with({"gravity_m_per_s2=9.81", "base.keep_modes=6",
+            "controller.compensation.learns_masses=true",
+            fmt::format("program=[{{move: {{}}}}, {{calibration: {{}}}}, {{admittance: "
+                        "{{duration_s: 20}}, robot: [{{at_s: 0, duration_s: 4, joint: {0}, "
+                        "to_deg_or_m: {1}}}, {3}{{at_s: 8.5, duration_s: 4, joint: {0}, "
+                        "to_deg_or_m: {2}}}]}}]",
+                        swing, to, back, events)},
+           kMean));
+}
+
+// Nobody tells what it is, only that the gripper moved, somewhat early or late, or in vain.
+TEST_F(Emulation, AnUntoldLoadIsLearntOnceTheGripperIsToldToHaveMoved) {
+  const std::string load =
+      "{at_s: 6, grasp: {mass_kg: 3, center_m: [0, 0, 0.05], "
+      "inertia_kg_m2: [0.01, 0.01, 0.01, 0, 0, 0]}}, ";
+  const auto moved = [](double at) { return fmt::format("{{at_s: {}, gripper: true}}, ", at); };
+  struct Case {
+    std::string what, events;
+    double doss, puma;  // [-] of the travel, at most
+  };
+  const Case cases[] = {{"now", load + moved(6.0), 0.01, 0.02},
+                        {"early", moved(5.75) + load, 0.01, 0.02},
+                        {"late", load + moved(6.25), 0.03, 0.15},
+                        {"in vain", moved(6.0), 0.01, 0.02}};
+  for (const auto& [what, events, doss, puma] : cases)
+    for (const bool is_doss : {true, false}) {
+      const Experiment e = is_doss ? takesALoad("srms_capture_doss", "joint_3", -60, -90, events)
+                                   : takesALoad("srms_capture_puma", "joint_1", 30, 0, events);
+      const Series series = run(e);
+      ASSERT_TRUE(result_.good());
+      EXPECT_LT(share(e, series), is_doss ? doss : puma) << e.name << what;
+      // Nothing stays open: the last seconds have no force.
+      int withheld = 0, of = 0;
+      for (const Row& row : series.rows) {
+        if (row.state.segment != 2 || row.state.phase != static_cast<int>(Phase::kRunning))
+          continue;
+        if (++of > 1500) withheld += row.state.withholds;
+      }
+      EXPECT_GT(withheld, 450) << e.name << what;
+    }
+  const Experiment e = takesALoad("srms_capture_doss", "joint_3", -60, -90, load);
+  const Series untold = run(e);
+  EXPECT_GT(share(e, untold), 0.2);  // what it is about
+}
+
 // Half a ton afloat for two minutes: sums of forces would drift, those of momenta do not.
 TEST_F(Emulation, AFloatingBaseStaysWhereItsMomentumPutsIt) {
   std::mt19937 random(11);

@@ -350,6 +350,11 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"learning_without_a_model", "z_sine", "controller.compensation.learns_masses=true",
             "controller.compensation.learns_masses: needs the robot's model beside the sensor, "
             "want 'wrench: aided'"},
+        Bad{"gripper_without_learning", "puma_on_table_4_1",
+            "program=[{move: {}}, {admittance: {duration_s: 9}, robot: [{at_s: 1, gripper: "
+            "true}]}]",
+            "gripper: what it holds is to be learnt, want 'learns_masses: true' in "
+            "controller.compensation"},
         Bad{"aided_without_inertia", "z_sine", "controller.compensation.wrench=aided",
             "'aided' needs the robot's inertia taken out, want 'inertia: true'"},
         Bad{"wrench_choice", "z_sine", "controller.compensation.wrench=clean",

@@ -75,6 +75,7 @@ TEST(NoHeapInOrders, ThroughEveryOrder) {
                           another,
                           order(Request::kUncompensate),
                           order(Request::kCompensate),
+                          order(Request::kGripper),
                           order(Request::kReset),  // refused: not stopped
                           order(Request::kRun, test::segment(SegmentKind::kMonitor, 1.0)),
                           order(Request::kStart),

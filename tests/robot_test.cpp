@@ -97,6 +97,8 @@ TEST_P(MovingBase, MassColumnsAreWhatARobotOfOtherMassesDiffersBy) {
   const std::string name = GetParam();
   const RobotModel robot = name == "skew" ? skewRobot() : test::robot(name).model;
   const MassRegressor regressor(robot);
+  const Hand hand{robot.size - 1, Vec3(0.1, -0.05, 0.2)};
+  const MassRegressor with_hand(robot, hand);
   const Transform X_PL0{rotation({0.3, -0.2, 0.5}), Vec3(0.1, -0.3, 0.4)};
   const Vec3 g_I(1.0, -2.0, -9.0);
   std::mt19937 random(3);
@@ -122,6 +124,21 @@ TEST_P(MovingBase, MassColumnsAreWhatARobotOfOtherMassesDiffersBy) {
     ASSERT_LT((momentum * by - (momentum_1 - momentum_0)).norm(), 1e-10 * momentum_0.norm());
     ASSERT_LT((weight * by - (weight_1 - weight_0)).norm(), 1e-10 * weight_0.norm());
     ASSERT_GT((weight_1 - weight_0).norm(), 1e-3 * weight_0.norm());
+
+    // A body at the hand; what its centre is off by counts in its weight alone.
+    with_hand.evaluate(X_PL0, g_I, {P.X.R, P.v, P.w, joints.q, joints.q_dot}, momentum, weight);
+    ASSERT_EQ(with_hand.hand(), with_hand.size() - 4);
+    const double mass = 3.0;
+    const Vec3 off = 0.1 * Vec3(some(random), some(random), some(random));
+    const auto [momentum_2, weight_2] =
+        ofRobot(withLoad(robot, hand.link, {mass, hand.p_LT_L, Mat3::Zero()}));
+    const auto [momentum_3, weight_3] =
+        ofRobot(withLoad(robot, hand.link, {mass, hand.p_LT_L + off, Mat3::Zero()}));
+    ASSERT_LT((mass * momentum.col(with_hand.hand()) - (momentum_2 - momentum_0)).norm(),
+              1e-10 * momentum_0.norm());
+    MassVector held = MassVector::Zero(with_hand.size());
+    held.tail<4>() << mass, mass * off;
+    ASSERT_LT((weight * held - (weight_3 - weight_0)).norm(), 1e-10 * weight_0.norm());
   }
 }
 

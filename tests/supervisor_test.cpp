@@ -17,11 +17,16 @@ using test::puma;
 /// A supervisor with everything around it.
 struct Desk {
   explicit Desk(const ControllerConfig& config)
-      : c(config), path(c.safety, c.geometry), motion(c), bias(c), share(c.compensation, 0.01) {
+      : c(config),
+        path(c.safety, c.geometry),
+        motion(c),
+        bias(c),
+        share(c.compensation, 0.01),
+        carried(c) {
     for (int n = 0; n <= c.arming_samples; ++n) stream.update(numbered(n), 0, false, false);
   }
   Situation now() { return {c, path, tick, stream.freshTicks(), dynamic, M_1, 0.0, L}; }
-  Actuation act() { return {motion, bias, stream, share}; }
+  Actuation act() { return {motion, bias, stream, share, carried}; }
   TickState order(Request request, const Segment& segment = {}) {
     supervisor.handle({request, segment, {1, tick}}, now(), act());
     return advance();
@@ -46,6 +51,7 @@ struct Desk {
   SensorBias bias;
   SampleStream stream{10'000'000};
   CompensationShare share;
+  KnownPayload carried;
   Supervisor supervisor;
   Wrench dynamic;
   Mat6 M_1 = Mat6::Zero();
@@ -127,6 +133,26 @@ TEST(Supervisor, TheVerdictIsOfTheLoopAsItIsCompensated) {
   EXPECT_EQ(desk.order(Request::kRun, admittance).refusal, Refusal::kNone);
   EXPECT_EQ(desk.order(Request::kUncompensate).refusal, Refusal::kUnstable);
   EXPECT_TRUE(desk.share.wanted());
+}
+
+TEST(Supervisor, TheGripperIsToldToOneThatLearnsWhatItHolds) {
+  for (const bool learns : {false, true})
+    for (const bool tool : {false, true}) {
+      ControllerConfig config = puma();
+      config.compensation.learns_masses = learns;
+      if (!tool) config.hand = {};
+      Desk desk(config);
+      const bool can = learns && tool;
+      EXPECT_EQ(desk.order(Request::kGripper).refusal,
+                can ? Refusal::kNotArmed : Refusal::kNotLearning);
+      desk.arm();
+      EXPECT_EQ(desk.order(Request::kGripper).refusal,
+                can ? Refusal::kNone : Refusal::kNotLearning);
+      desk.carried.update({}, -1);
+      EXPECT_EQ(desk.carried.gripperMoved(), can);
+      desk.carried.update({}, -1);
+      EXPECT_FALSE(desk.carried.gripperMoved());
+    }
 }
 
 TEST(Supervisor, ARefusedPathNamesItsCheckAndChangesNothing) {

@@ -45,6 +45,8 @@ Compensation readCompensation(Section& controller) {
   if (s.has("learns_masses")) c.learns_masses = s.flag("learns_masses");
   if (c.learns_masses && !c.aided)
     s.fail("learns_masses", "needs the robot's model beside the sensor, want 'wrench: aided'");
+  if (s.has("hand_mass_kg")) c.hand_mass = s.number("hand_mass_kg", 0.0, 1e4);
+  if (s.has("hand_center_m")) c.hand_center = s.number("hand_center_m", 0.0, 10.0);
   c.gate = s.number("gate_deviations", 0.0, 100.0);
   c.gate_hold = s.number("gate_hold_s", 0.0, 100.0);
   c.timing_error = s.number("timing_error_s", 0.0, 0.005);

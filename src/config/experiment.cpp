@@ -166,6 +166,7 @@ Experiment build(const Value& document, AskedKey* asked = nullptr) {
     if (!out.robot.choice.empty()) out.source.warnings.push_back(out.robot.choice);
   }
 
+  if (const NamedFrame* tool = out.robot.tool()) c.hand = {tool->link, tool->X_link.p};
   p.geometry = c.geometry;
   p.initial_pose = readPose(root.section("initial_pose"));
   p.leg_slave = legs.gains;

@@ -79,11 +79,10 @@ void RobotEvents::pass(const Segment& segment) {
 
 void RobotEvents::read(Section& s, const Cue& cue) {
   using Read = void (RobotEvents::*)(Section&, const Cue&);
-  constexpr std::pair<std::string_view, Read> kKinds[] = {{"joint", &RobotEvents::readJoint},
-                                                          {"tool", &RobotEvents::readTool},
-                                                          {"grasp", &RobotEvents::readGrasp},
-                                                          {"release", &RobotEvents::readRelease},
-                                                          {"push", &RobotEvents::readPush}};
+  constexpr std::pair<std::string_view, Read> kKinds[] = {
+      {"joint", &RobotEvents::readJoint},     {"tool", &RobotEvents::readTool},
+      {"grasp", &RobotEvents::readGrasp},     {"release", &RobotEvents::readRelease},
+      {"gripper", &RobotEvents::readGripper}, {"push", &RobotEvents::readPush}};
   const auto* found = std::end(kKinds);
   for (const auto& kind : kKinds) {
     if (!s.has(kind.first)) continue;
@@ -91,7 +90,8 @@ void RobotEvents::read(Section& s, const Cue& cue) {
       s.fail(kind.first, fmt::format("beside {}, want only one of them", found->first));
     found = &kind;
   }
-  if (found == std::end(kKinds)) s.fail("joint", "missing, want it, tool, grasp, release or push");
+  if (found == std::end(kKinds))
+    s.fail("joint", "missing, want it, tool, grasp, release, gripper or push");
   if (robot_.frames.empty() && found->first != "push") s.fail(found->first, "there is no robot");
   const std::int64_t end = std::llround(segmentOf(cue).duration * 1e9);
   if (end > 0 && cue.after >= end)
@@ -216,6 +216,18 @@ void RobotEvents::readRelease(Section& s, const Cue& cue) {
   release.finish();
   moved(cue, Release{}, sinceStart(cue));
   tell(s, cue, delay, {cue, -1, {}});
+}
+
+void RobotEvents::readGripper(Section& s, const Cue& cue) {
+  tool(s, "gripper");
+  if (!out_.controller.compensation.learns_masses)
+    s.fail("gripper",
+           "what it holds is to be learnt, want 'learns_masses: true' in controller.compensation");
+  if (!s.flag("gripper")) s.fail("gripper", "want true");
+  ToldLoad moved;
+  moved.cue = cue;
+  moved.known = false;
+  tell(s, cue, 0.0, moved);
 }
 
 void RobotEvents::readPush(Section& s, const Cue& cue) {

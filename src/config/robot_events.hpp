@@ -27,6 +27,7 @@ class RobotEvents {
   void readJoint(Section& s, const Cue& cue);
   void readTool(Section& s, const Cue& cue);
   void readGrasp(Section& s, const Cue& cue);
+  void readGripper(Section& s, const Cue& cue);
   void readPush(Section& s, const Cue& cue);
   void readRelease(Section& s, const Cue& cue);
   void tell(Section& s, const Cue& cue, std::optional<double> delay, ToldLoad load);

@@ -275,6 +275,7 @@ const std::vector<Item>& menu() {
       {Verb::kUncompensate, "uncompensate", "", "as published again"},
       {Verb::kVehicle, "vehicle", "[in SECONDS] [mass|damping|stiffness FACTOR]...",
        "another vehicle: times the scenario's"},
+      {Verb::kGripper, "gripper", "", "it has closed or opened: learn what it holds"},
       {Verb::kWait, "wait", "SECONDS", "nothing, for so long"},
       {Verb::kHelp, "help", "", "this list"},
       {Verb::kQuit, "quit", "", "home, let go, end"},
@@ -335,6 +336,7 @@ void parseArguments(Words& words, const Experiment& experiment, Command& command
       order.request = Request::kVehicle;
       order.vehicle = vehicle(words);
       break;
+    case Verb::kGripper: order.request = Request::kGripper; break;
     case Verb::kStop:
     case Verb::kQuit: order.request = Request::kStop; break;
     case Verb::kRobot: command.robot = robotMove(words, experiment); break;

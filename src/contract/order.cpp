@@ -30,6 +30,7 @@ std::string_view name(Request request) noexcept {
     case Request::kUncompensate: return "uncompensate";
     case Request::kOvertaken: return "overtaken";
     case Request::kVehicle: return "vehicle";
+    case Request::kGripper: return "gripper";
     case Request::kCount: break;
   }
   return "unknown";
@@ -52,6 +53,7 @@ std::string_view name(Refusal refusal) noexcept {
     case Refusal::kOvertaken: return "a hold, a stop or a failing check came before it";
     case Refusal::kTooLong: return "the loop grows slowly, and would grow too much in that time";
     case Refusal::kTooFast: return "a mode of that vehicle would be too fast for the period";
+    case Refusal::kNotLearning: return "masses are not learnt, or the robot has no tool";
     case Refusal::kCount: break;
   }
   return "unknown";

@@ -64,6 +64,13 @@ bool ResidualGate::exceeds(std::size_t i, const Vec6& mean, const ResidualNoise&
   return !(mean.cwiseAbs().array() <= most.array()).all();
 }
 
+namespace {
+
+constexpr double kMostDeviations = 6.0;  // [-] that a parameter may be off
+constexpr double kDoubt = 0.5;           // [s] before and after the gripper is told to have moved
+
+}  // namespace
+
 AidedWrench::AidedWrench(const ControllerConfig& config)
     : aided_(config.compensation.aided),
       hold_(std::max(1, static_cast<int>(
@@ -76,13 +83,22 @@ AidedWrench::AidedWrench(const ControllerConfig& config)
       X_SP_(inverse(config.sensor.X_PS)),
       S_proc_(inverse(config.sensor.C_proc)),
       X_PL0_(config.payload.X_PL0()),
-      regressor_(config.compensation.learns_masses ? config.payload.robot : RobotModel()),
+      regressor_(config.compensation.learns_masses
+                     ? MassRegressor(config.payload.robot, config.hand)
+                     : MassRegressor(RobotModel())),
       common_(config.compensation.mass_error / std::sqrt(3.0)),
       prior_(regressor_.deviations(common_)),
+      most_(kMostDeviations * prior_),
       bias_deviation_(config.stillness.bias),
       gate_(config),
       twist_(config.servo.sensor_cutoff),
-      used_(MassVector::Zero(prior_.size())) {}
+      doubted_(static_cast<int>(std::lround(kDoubt / config.periodSeconds()))),
+      used_(MassVector::Zero(prior_.size())) {
+  const double mass = config.compensation.hand_mass;
+  hand_.setConstant(mass * config.compensation.hand_center);
+  hand_(0) = mass;
+  if (regressor_.hand() >= 0) most_.segment<4>(regressor_.hand()) = kMostDeviations * hand_;
+}
 
 Wrench AidedWrench::update(const Input& in, bool engaged) noexcept {
   taught_ = false;
@@ -90,6 +106,10 @@ Wrench AidedWrench::update(const Input& in, bool engaged) noexcept {
   lesson_.withheld = {};
   lesson_.group_ends = false;
   lesson_.replay = 0;
+  lesson_.passed = {};
+  lesson_.passing = false;
+  lesson_.hand = -1;
+  lesson_.was_weight = false;
   if (!aided_) return in.measured;
   if (!engaged) {
     restart();
@@ -103,15 +123,23 @@ Wrench AidedWrench::update(const Input& in, bool engaged) noexcept {
   reaction_ = in.joints.force();
   calibrate(in);
   if (!begun_) return in.measured;
+  if (in.gripper && regressor_.hand() >= 0) doubtHand(countsPerWrench(in.X_IP.R));
   if (in.samples.fresh()) {
     constexpr std::int64_t kRefresh = 100;  // [-] samples: attitude and joints change slowly
     if (residuals_++ % kRefresh == 0) refreshNoise(in);
     const Wrench residual = in.measured - in.joints.shown(in.robot.platform().w);
     take(in, countsPerWrench(in.X_IP.R), residual);
   }
-  if (!withholds_) return in.measured;
-  lesson_.withheld = Wrench::from(in.share * (in.measured - reaction_).stacked());
-  return in.measured - lesson_.withheld;
+  const Wrench beyond = Wrench::from(in.share * (in.measured - reaction_).stacked());
+  closed_ = withholds_ ? closed_ + 1 : 0;
+  passing_ = closed_ <= hold_ ? passing_ + 1 : 0;
+  lesson_.passing = passing_ > 0;
+  if (!withholds_) {
+    lesson_.passed = beyond;
+    return in.measured;
+  }
+  lesson_.withheld = beyond;
+  return in.measured - beyond;
 }
 
 /// A calibration measures bias and weight together: what it read beyond the weight then believed
@@ -163,6 +191,7 @@ void AidedWrench::take(const Input& in, const Mat6& counts_per_wrench,
                       {in.X_IP.R, felt.head<3>(), felt.tail<3>(), in.joints.q(), in.joints.q_dot()},
                       lesson_.momentum, weight_);
   open_ = std::max(0, open_ - 1);
+  doubts_ = std::max(0, doubts_ - 1);
   withholds_ = open_ == 0;
   if (!withholds_) return;
   const Vec6 y = counts_per_wrench * residual.stacked() + in.bias.learnt(),
@@ -224,8 +253,23 @@ void AidedWrench::endGroup(const Mat6& counts_per_wrench) noexcept {
   belief_.learn(kShare * (sum.columns - before.columns), kShare * (sum.y - before.y),
                 variance(static_cast<int>(kGroupsOfBlock) * Lesson::kGroup, noise_), legsMomentum(),
                 block_time);
+  if (doubts_ > 0) belief_.doubt(regressor_.hand(), hand_);
   beliefs_[(block + 1) % kBlocks] = belief_;
   use();
+}
+
+/// What passed of late was the weight in the hand, and what comes may be.
+void AidedWrench::doubtHand(const Mat6& counts_per_wrench) noexcept {
+  lesson_.hand = regressor_.hand();
+  lesson_.was_weight = passing_ > 0 && passing_ <= doubted_;
+  passing_ = open_ = 0;
+  doubts_ = doubted_;
+  belief_.doubt(regressor_.hand(), hand_);
+  restart();
+  if (weight_.cols() != prior_.size()) return;  // before the first sample
+  MassColumns weight;
+  weight.noalias() = counts_per_wrench * weight_;
+  unknown_ = belief_.variance(weight);
 }
 
 /// Judged by what was known `before`.
@@ -253,9 +297,10 @@ void AidedWrench::open(const MassBelief& before, int samples) noexcept {
 /// The model has what is believed now, within reason.
 void AidedWrench::use() noexcept {
   if (prior_.size() == 0) return;
-  constexpr double kMost = 6.0, kLeast = 0.1;  // [-] deviations; of a body's mass
-  MassVector next = belief_.parameters().cwiseMin(kMost * prior_).cwiseMax(-kMost * prior_);
-  for (Eigen::Index i = 0; i < next.size(); i += 4) next(i) = std::max(next(i), kLeast - 1.0);
+  constexpr double kLeast = 0.1;  // [-] of a body's mass
+  MassVector next = belief_.parameters().cwiseMin(most_).cwiseMax(-most_);
+  for (Eigen::Index i = 0; i < next.size(); i += 4)
+    next(i) = std::max(next(i), i == regressor_.hand() ? 0.0 : kLeast - 1.0);
   if (next == used_) return;
   lesson_.learnt = next - used_;
   used_ = next;

@@ -18,7 +18,7 @@ void Hindsight::reset(const AdmittanceModel& model, const Lesson& lesson) noexce
   eta_dot_.setZero(k, n);
   momentum_.resize(k, n);
   momentum_.noalias() = base.Phi().transpose() * lesson.momentum / model.factors().mass;
-  withheld_ = owed_ = due_ = past_[0] = base.atRest();
+  withheld_ = passed_ = owed_ = due_ = past_[0] = base.atRest();
   kept_ = 1;
   remaining_ = 0;
   any_ = false;
@@ -32,19 +32,34 @@ void Hindsight::step(const AdmittanceModel& model, const Mat6& M_1, double dt,
   const double mass = model.factors().mass;
   const ModalDynamics::Body body = base.body(M_1 / mass);
   const ModalDynamics::Forces none = ModalDynamics::Forces::Zero(base.size());
+  if (lesson.momentum.cols() == eta_.cols() && lesson.hand >= 0) {
+    eta_.middleCols<4>(lesson.hand).setZero();
+    momentum_.middleCols<4>(lesson.hand).noalias() =
+        base.Phi().transpose() * lesson.momentum.middleCols<4>(lesson.hand) / mass;
+  }
   if (lesson.momentum.cols() == eta_.cols()) learn(base, body, mass, dt, lesson.momentum);
   if (remaining_ > 0) owed_ = base.advance(body, dt, owed_, none);
   if (lesson.learnt.size() == eta_.cols() && lesson.learnt.size() > 0)
     owe({eta_ * lesson.learnt, eta_dot_ * lesson.learnt}, 1.0);
 
-  const ModalDynamics::Forces u = base.Phi().transpose() * lesson.withheld.stacked() / mass;
-  withheld_ = base.advance(body, dt, withheld_, u);
+  const auto force = [&](const Wrench& F_Po_I) -> ModalDynamics::Forces {
+    return base.Phi().transpose() * F_Po_I.stacked() / mass;
+  };
+  withheld_ = base.advance(body, dt, withheld_, force(lesson.withheld));
+  if (lesson.was_weight) owe(passed_, -1.0);
+  if (lesson.passing)
+    passed_ = base.advance(body, dt, passed_, force(lesson.passed));
+  else
+    passed_ = base.atRest();
   if (lesson.replay > 0) {
     const auto groups = static_cast<std::size_t>((lesson.replay - 1) / Lesson::kGroup + 1);
     const std::size_t back = std::min({groups, kept_, kKept});
     const double since = lesson.replay * period_;
+    const Modes before = base.advance(body, since, past_[(kept_ - back) % kKept], none);
+    passed_.eta += withheld_.eta - before.eta;
+    passed_.eta_dot += withheld_.eta_dot - before.eta_dot;
     owe(withheld_, 1.0);
-    owe(base.advance(body, since, past_[(kept_ - back) % kKept], none), -1.0);
+    owe(before, -1.0);
     withheld_ = past_[0] = base.atRest();
     kept_ = 1;
   } else if (lesson.group_ends) {

@@ -17,6 +17,8 @@ KnownPayload::KnownPayload(const ControllerConfig& config)
 void KnownPayload::update(const Elapsed& elapsed, std::int32_t commanded) noexcept {
   changed_ = learnt_ = learns_;
   learns_ = false;
+  gripper_moved_ = gripper_moves_;
+  gripper_moves_ = false;
   if (commanded != segment_) {
     if (commanded < segment_) done_.fill(false);  // a program begins anew
     segment_ = commanded;
@@ -27,8 +29,13 @@ void KnownPayload::update(const Elapsed& elapsed, std::int32_t commanded) noexce
     const Cue& cue = told_.loads[i].cue;
     if (done_[i] || cue.segment != segment_ || since < cue.after) continue;
     done_[i] = true;
+    if (!told_.loads[i].known) {
+      gripper_moved_ = true;
+      continue;
+    }
     in_hand_ = told_.loads[i];
     changed_ = true;
+    learnt_ = false;  // its weight is new, and not what was carried all along
   }
   if (changed_) take();
 }

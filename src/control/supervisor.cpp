@@ -53,6 +53,11 @@ Refusal Supervisor::obey(const Order& order, const Situation& now, Actuation act
     case Request::kCompensate: return compensate(true, now, act);
     case Request::kUncompensate: return compensate(false, now, act);
     case Request::kVehicle: return changeVehicle(order, now, act);
+    case Request::kGripper:
+      if (!now.config.learnsHand()) return Refusal::kNotLearning;
+      if (!ours()) return Refusal::kNotArmed;
+      act.carried.moveGripper();
+      return Refusal::kNone;
     case Request::kReset: return reset(act);
   }
   return Refusal::kNone;

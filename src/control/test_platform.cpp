@@ -45,8 +45,9 @@ const TickState& TestPlatform::tick(const TickInput& in) noexcept {
   W.inertial = robot_.update(known_, elapsed.count, joints_.q(), samples_.wrench().since, X_IP,
                              legs_.feltMotion(), engaged, share_.value());
   const Wrench measured = W.total - W.static_wrench + W.inertial;
-  W.felt = aided_.update(
-      {measured, W.static_wrench, robot_, joints_, samples_, bias_, X_IP, share_.value()}, engaged);
+  W.felt = aided_.update({measured, W.static_wrench, robot_, joints_, samples_, bias_, X_IP,
+                          share_.value(), known_.gripperMoved()},
+                         engaged);
   if (aided_.taught()) {
     known_.learn(aided_.robot());
     bias_.learn(aided_.belief().bias());
@@ -63,7 +64,7 @@ const TickState& TestPlatform::tick(const TickInput& in) noexcept {
                       robot_.M_1(),
                       samples_.wrench().age,
                       commander_.legs().L};
-  const Actuation act{motion_, bias_, samples_, share_};
+  const Actuation act{motion_, bias_, samples_, share_, known_};
   supervisor_.handle(in.order, now, act);
   supervisor_.advance(now, act);
 

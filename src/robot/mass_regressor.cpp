@@ -30,24 +30,29 @@ Moments momentsPer(const RigidBody& body, int parameter) {
 
 }  // namespace
 
-MassRegressor::MassRegressor(const RobotModel& robot) : robot_(robot) {
+MassRegressor::MassRegressor(const RobotModel& robot, const Hand& hand) : robot_(robot) {
   std::array<int, kMaxLinks + 1> all{};
   int size = 0;
   for (int i = -1; i < robot.size; ++i)
     if (robot_.bodyOf(i).mass > 0.0) all[static_cast<std::size_t>(size++)] = i;
   std::stable_sort(all.begin(), all.begin() + size,
                    [&](int a, int b) { return robot_.bodyOf(a).mass > robot_.bodyOf(b).mass; });
-  count_ = std::min(size, kMaxUncertain);
+  count_ = std::min(size, kMaxUncertain - 1);
   std::sort(all.begin(), all.begin() + count_);
   for (std::size_t i = 0; i < static_cast<std::size_t>(count_); ++i) {
     links_[i] = all[i];
     body_[i] = robot_.bodyOf(all[i]);
   }
+  if (hand.link < -1) return;
+  hand_ = 4 * count_;
+  links_[static_cast<std::size_t>(count_)] = hand.link;
+  body_[static_cast<std::size_t>(count_++)] = {1.0, hand.p_LT_L, Mat3::Zero()};
 }
 
 MassVector MassRegressor::deviations(double share) const noexcept {
   MassVector out(size());
   for (int i = 0; i < count_; ++i) {
+    if (4 * i == hand_) share = 0.0;  // the last
     out(4 * i) = share;
     out.segment<3>(4 * i + 1).setConstant(share *
                                           body_[static_cast<std::size_t>(i)].p_BoBcm_B.norm());
@@ -108,18 +113,19 @@ void MassRegressor::evaluate(const Transform& X_PL0, const Vec3& g_I, const Stat
 RobotModel MassRegressor::changed(const MassVector& parameters) const noexcept {
   RobotModel out = robot_;
   for (int i = 0; i < count_; ++i) {
-    const RigidBody& body = body_[static_cast<std::size_t>(i)];
-    Moments sum = momentsOf(body);
+    RigidBody& carrier = out.bodyOf(links_[static_cast<std::size_t>(i)]);
+    Moments sum = momentsOf(carrier);
     for (int j = 0; j < 4; ++j) {
-      const Moments m = momentsPer(body, j);
+      const Moments m = momentsPer(body_[static_cast<std::size_t>(i)], j);
       const double by = parameters(4 * i + j);
       sum.mass += by * m.mass;
       sum.s += by * m.s;
       sum.I += by * m.I;
     }
+    if (!(sum.mass > 0.0)) continue;
     const Vec3 c = sum.s / sum.mass;
-    out.bodyOf(links_[static_cast<std::size_t>(i)]) = {
-        sum.mass, c, sum.I - sum.mass * (c.squaredNorm() * Mat3::Identity() - c * c.transpose())};
+    carrier = {sum.mass, c,
+               sum.I - sum.mass * (c.squaredNorm() * Mat3::Identity() - c * c.transpose())};
   }
   return out;
 }

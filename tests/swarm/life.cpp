@@ -71,7 +71,10 @@ std::vector<std::string> drawSettings(Dice& dice, const Scenario& scenario) {
     put(c + "observer", observer ? "true" : "false");
     put(c + "inertia", inertia ? "true" : "false");
     if (observer) maybe(0.3, c + "adaptation", "true");
-    if (inertia) maybe(0.4, c + "wrench", "aided");
+    if (inertia && dice.chance(0.4)) {
+      put(c + "wrench", "aided");
+      maybe(0.5, c + "learns_masses", "true");
+    }
     if (inertia) maybe(0.3, c + "mass_update_ticks", std::to_string(dice.whole(2, 40)));
     maybe(0.5, c + "ramp_s", fmt::format("{:.2f}", std::exp(dice.between(-4.0, 1.6))));
   }
@@ -296,8 +299,10 @@ Life draw(std::uint64_t seed, const std::filesystem::path& config) {
       life.events.push_back(ask(tick, "uncompensate"));
     } else if (what < 82) {
       life.events.push_back(ask(tick, "program"));
-    } else if (what < 86) {
+    } else if (what < 84) {
       life.events.push_back(ask(tick, "reset"));
+    } else if (what < 86) {
+      life.events.push_back(ask(tick, "gripper"));
     } else if (what < 92) {
       life.events.push_back(ask(tick, "arm"));
     } else if (has_robot) {

@@ -33,6 +33,7 @@ enum class Verb {
   kCompensate,
   kUncompensate,
   kVehicle,
+  kGripper,
   kWait,
   kHelp,
   kQuit

@@ -144,6 +144,7 @@ enum class Request : std::int32_t {
   kUncompensate,  // and goes out again: as published
   kOvertaken,     // an order that a hold or a stop came before: it is answered, and not obeyed
   kVehicle,       // its mass, damping and stiffness change to the order's
+  kGripper,       // it has closed or opened: what is in the hand is to be learnt
   kCount
 };
 
@@ -164,8 +165,9 @@ enum class Refusal : std::int32_t {
   kUnassessed,      // the stability of this loop was not checked
   kChecking,        // not refused yet: its path is being checked, over some ticks
   kOvertaken,       // a hold, a stop or a failing check came before it began
-  kTooLong,  // the loop grows, slowly: longer than the program's segments it was not let pass
-  kTooFast,  // a mode of the vehicle would be too fast to be followed with the robot on it
+  kTooLong,      // the loop grows, slowly: longer than the program's segments it was not let pass
+  kTooFast,      // a mode of the vehicle would be too fast to be followed with the robot on it
+  kNotLearning,  // the robot's masses, and so what is in its hand, are not learnt
   kCount
 };
 

@@ -50,6 +50,9 @@ class ResidualGate {
 /// it is a force: it passes, the base is given what was withheld of it, and what was learnt from it
 /// is forgotten. The sensor's noise is what its last calibration found; without one everything
 /// passes.
+///
+/// Where the gripper has closed or opened, for half a second what a body in the hand may explain is
+/// taken for its weight, also what passed in the half second before.
 class AidedWrench {
  public:
   explicit AidedWrench(const ControllerConfig& config);
@@ -63,6 +66,7 @@ class AidedWrench {
     const SensorBias& bias;
     const Transform& X_IP;
     double share;  // [-] of the compensation
+    bool gripper;  // has closed or opened: what is in the hand is not known any more
   };
   /// F_Po_I that the admittance model is to feel; before the legs are `engaged`, the measured one.
   Wrench update(const Input& in, bool engaged) noexcept;
@@ -95,6 +99,7 @@ class AidedWrench {
   bool isForce(std::size_t mean, const MassBelief& before) noexcept;
   void open(const MassBelief& before, int samples) noexcept;
   void restart() noexcept;
+  void doubtHand(const Mat6& counts_per_wrench) noexcept;
   void use() noexcept;
   Mat6 countsPerWrench(const Mat3& R_IP) const noexcept;  // about Po in I
   void refreshNoise(const Input& in) noexcept;
@@ -112,11 +117,14 @@ class AidedWrench {
   MassRegressor regressor_;
   double common_;          // [-] deviation of all bodies' density,
   MassVector prior_;       // [-, m] and of each parameter besides
+  MassVector most_;        // [-, m, kg, kg m] that a parameter may be
+  Eigen::Vector4d hand_;   // [kg, kg m] deviations of what is in the hand, where that is not known
   double bias_deviation_;  // [count] before a calibration
   ResidualGate gate_;
   ResidualNoise noise_;
   Butterworth2<6> twist_;       // of the platform, as the wrench shows it
   bool settled_ = false;        // twist_
+  int doubted_;                 // [-] samples for which the hand's load is doubted
   std::int64_t residuals_ = 0;  // [-] so far
 
   MassBelief belief_;
@@ -135,6 +143,9 @@ class AidedWrench {
   std::size_t groups_ = 0;
   std::array<MassBelief, kBlocks> beliefs_{};  // before each block, a ring
   int open_ = 0;                               // [-] samples to come
+  int doubts_ = 0;                             // [-] samples in which the hand's load may change
+  int passing_ = 0, closed_ = 0;               // [-] ticks since residuals passed first of late,
+                                               // and since they passed last
 
   Lesson lesson_;
   Wrench reaction_;

@@ -28,6 +28,8 @@ struct Compensation {
   double forgetting = 60.0;        // [s] of motion that counts for them, to 1/e
   bool aided = false;              // sensor noise kept out by the robot's model
   bool learns_masses = false;      // from what is kept out
+  double hand_mass = 5.0;          // [kg] about what a gripper may hold that nobody told of,
+  double hand_center = 0.1;        // [m] and how far from the tool's origin its centre may be
   double gate = 4.5;               // [-] deviations of the noise that a residual has to be above
   double gate_hold = 0.1;          // [s] for which it passes then
   // What the belief may be wrong by, for which the loop has to decay (analysis/gate.hpp).
@@ -61,8 +63,9 @@ struct GentleMotion {
 /// What the robot has in hand, as the controller is told at a time of the program.
 struct ToldLoad {
   Cue cue;
-  int link = -1;   // [-] that carries it; -1: link 0
-  RigidBody body;  // in that link's frame; without mass: nothing
+  int link = -1;      // [-] that carries it; -1: link 0
+  RigidBody body;     // in that link's frame; without mass: nothing
+  bool known = true;  // what it is; else only that the gripper has closed or opened
 };
 
 inline constexpr int kMaxToldLoads = 16;
@@ -80,7 +83,8 @@ struct Belief {
   ForceSensor sensor;
   Vec6 bias = Vec6::Zero();          // [count] until a calibration replaces it
   Payload payload;                   // what the sensor carries,
-  ToldLoads told_loads;              // and what the robot takes in hand
+  Hand hand;                         // where the robot holds things,
+  ToldLoads told_loads;              // and what it takes in hand
   Vec3 gravity = {0.0, 0.0, -9.81};  // [m/s^2] g_I
   ModalModel admittance;             // the vehicle
   LegCodec legs;
@@ -121,6 +125,8 @@ struct ControllerConfig : Belief {
   Stability stabilityOf(bool compensated) const noexcept {
     return compensated ? stability : stability_uncompensated;
   }
+  /// What the robot has in hand can be learnt.
+  bool learnsHand() const noexcept { return compensation.learns_masses && hand.link >= -1; }
   double periodSeconds() const noexcept {  // [s]
     return static_cast<double>(period) * kSecondPerNanosecond;
   }

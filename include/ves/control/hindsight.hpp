@@ -19,7 +19,11 @@ struct Lesson {
   MassVector learnt;     // by how much parameters are other than was believed; empty: nothing
   Wrench withheld;       // F_Po_I taken for noise in this tick
   bool group_ends = false;
-  int replay = 0;  // [-] samples for which that was wrong, this one included
+  int replay = 0;        // [-] samples for which that was wrong, this one included
+  Wrench passed;         // F_Po_I beyond the robot's model that the base was given,
+  bool passing = false;  // now or of late
+  int hand = -1;         // [-] the first parameter of a body that may be in the hand from now on,
+  bool was_weight = false;  // and what passed of late was its weight
 };
 
 class Hindsight {
@@ -48,7 +52,8 @@ class Hindsight {
   double period_;                         // [s]
   int slide_;                             // [-] steps over which a correction is given
   Sensitivity eta_, eta_dot_, momentum_;  // of the modes per parameter; momentum of base and robot
-  Modes withheld_;                        // what the base has not done
+  Modes withheld_;                        // what the base has not done,
+  Modes passed_;                          // and what it has, of what it was given of late
   std::array<Modes, kKept> past_{};       // a ring, the newest at kept_ - 1
   std::size_t kept_ = 0;
   Modes owed_, due_;

@@ -18,21 +18,26 @@ class MassBelief {
   using Covariance = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMost, kMost>;
 
   MassBelief() { begin(MassVector(0), 0.0, 0.0); }
-  /// Deviations of the parameters, of a density common to all bodies [-] besides, and of each
-  /// channel's bias [count].
+  /// Deviations of the parameters, of a density common to all bodies that have one [-] besides, and
+  /// of each channel's bias [count].
   void begin(const MassVector& deviations, double common, double bias) noexcept {
     const Eigen::Index n = deviations.size();
     x_.setZero(n + 12);
     P_.setZero(n + 12, n + 12);
     P_.diagonal().head(n) = deviations.cwiseAbs2();
     for (Eigen::Index i = 0; i < n; i += 4)
-      for (Eigen::Index j = 0; j < n; j += 4) P_(i, j) += common * common;
+      for (Eigen::Index j = 0; j < n; j += 4)
+        if (deviations(i) > 0.0 && deviations(j) > 0.0) P_(i, j) += common * common;
     P_.diagonal().segment<6>(n).setConstant(bias * bias);
   }
 
   auto parameters() const noexcept { return x_.head(size()); }
   Vec6 bias() const noexcept { return x_.segment<6>(size()); }  // [count] beyond what is taken out
 
+  /// Four parameters from `first` on may have changed, by so much.
+  void doubt(Eigen::Index first, const Eigen::Vector4d& deviations) noexcept {
+    P_.diagonal().segment<4>(first) += deviations.cwiseAbs2();
+  }
   /// The bias that is taken out has changed by so much. [count]
   void moveBias(const Vec6& by) noexcept { x_.segment<6>(size()) -= by; }
 

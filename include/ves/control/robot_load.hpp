@@ -20,6 +20,8 @@ class KnownPayload {
   void update(const Elapsed& elapsed, std::int32_t commanded) noexcept;
   /// The robot is known better: what it has carried all along.
   void learn(const RobotModel& robot) noexcept;
+  /// The gripper has closed or opened, from the next tick on.
+  void moveGripper() noexcept { gripper_moves_ = true; }
 
   const Payload& payload() const noexcept { return payload_; }
   /// All of it, counted into the robot's links.
@@ -27,6 +29,8 @@ class KnownPayload {
   const RobotModel& before() const noexcept { return before_; }  // carried() until the last change
   bool changed() const noexcept { return changed_; }             // in this tick,
   bool learnt() const noexcept { return learnt_; }               // and learnt
+  /// In this tick it was told that the gripper has closed or opened, and not on what.
+  bool gripperMoved() const noexcept { return gripper_moved_; }
 
  private:
   void take() noexcept;
@@ -41,6 +45,7 @@ class KnownPayload {
   std::int64_t began_ = 0;     // [-] tick of the first command that named it
   std::array<bool, kMaxToldLoads> done_{};
   bool changed_ = false, learnt_ = false, learns_ = false;
+  bool gripper_moved_ = false, gripper_moves_ = false;
 };
 
 /// The weight of everything the sensor carries.

@@ -10,6 +10,7 @@
 #include "ves/control/answers.hpp"
 #include "ves/control/leg_commander.hpp"
 #include "ves/control/motion_generator.hpp"
+#include "ves/control/robot_load.hpp"
 #include "ves/control/sensor_bias.hpp"
 #include "ves/control/tick_clock.hpp"
 
@@ -33,6 +34,7 @@ struct Actuation {
   SensorBias& bias;
   SampleStream& samples;
   CompensationShare& share;
+  KnownPayload& carried;
 };
 
 class Supervisor {

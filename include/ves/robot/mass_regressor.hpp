@@ -8,8 +8,8 @@
 
 namespace ves {
 
-/// Bodies whose masses may be wrong: the heaviest of a robot's.
-inline constexpr int kMaxUncertain = 8;
+/// Bodies whose masses may be wrong: the heaviest of a robot's, and what is in its hand.
+inline constexpr int kMaxUncertain = 9;
 /// {density [-], shift of the first moment x, y, z per the believed mass [m]} of each body: mass,
 /// first moment, and, to first order, the inertia about the link's origin are linear in them.
 inline constexpr int kMaxMassParameters = 4 * kMaxUncertain;
@@ -17,13 +17,16 @@ using MassVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxMassParameter
 /// One column a parameter.
 using MassColumns = Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, kMaxMassParameters>;
 
+/// The last four parameters are those of a body in the hand that nobody told of: of 1 kg and at the
+/// hand, so its mass [kg] and its first moment about there [kg m].
 class MassRegressor {
  public:
-  explicit MassRegressor(const RobotModel& robot);
+  explicit MassRegressor(const RobotModel& robot, const Hand& hand = {});
 
   int size() const noexcept { return 4 * count_; }  // parameters
+  int hand() const noexcept { return hand_; }       // the first of its parameters; -1: none
   /// What the parameters may be where each body's mass is off by a share of it, and its centre by
-  /// that share of its distance from the link's origin.
+  /// that share of its distance from the link's origin. Nothing is in the hand.
   MassVector deviations(double share) const noexcept;
 
   /// A platform and the robot on it.
@@ -44,7 +47,7 @@ class MassRegressor {
   RobotModel robot_;
   std::array<int, kMaxUncertain> links_{};  // -1: link 0
   std::array<RigidBody, kMaxUncertain> body_{};
-  int count_ = 0;
+  int count_ = 0, hand_ = -1;
 };
 
 }  // namespace ves

@@ -113,6 +113,12 @@ LinkPoses linkPoses(const RobotModel& robot, const JointVector& q) noexcept;
 /// The whole robot with its joints locked at q, in L0: [M_1] of (3.1).
 RigidBody compositeBody(const RobotModel& robot, const JointVector& q) noexcept;
 
+/// Where a robot holds things.
+struct Hand {
+  int link = -2;               // [-] that carries it; -1: link 0, -2: there is none
+  Vec3 p_LT_L = Vec3::Zero();  // [m] in that link's frame
+};
+
 /// The robot with a further body on a link (-1: link 0), rigid, in that link's frame.
 RobotModel withLoad(RobotModel robot, int link, const RigidBody& load) noexcept;
 
