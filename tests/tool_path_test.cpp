@@ -378,7 +378,7 @@ TEST(ToolEvents, RefuseInOneLine) {
   EXPECT_EQ(said("{at_s: 1, duration_s: 1, tool: {to: {position_m: [0, 0, 9]}}, joint: joint_1}"),
             "robot[0].tool: beside joint, want only one of them");
   EXPECT_EQ(said("{at_s: 1, duration_s: 1}"),
-            "robot[0].joint: missing, want it, tool, grasp, release or push");
+            "robot[0].joint: missing, want it, tool, grasp, release, gripper or push");
   EXPECT_EQ(said("{at_s: 8, duration_s: 1, joint: joint_1, to_deg_or_m: 0}"),
             "robot[0].at_s: 8 s, but the segment ends after 8 s");
   EXPECT_EQ(said("{at_s: 1, duration_s: 2, joint: joint_2, to_deg_or_m: -70}, {at_s: 2.5, "
