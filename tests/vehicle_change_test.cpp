@@ -13,6 +13,7 @@
 
 #include "support/rig.hpp"
 #include "ves/analysis/gate.hpp"
+#include "ves/control/hindsight.hpp"
 #include "ves/math/dense.hpp"
 #include "ves/run/replay.hpp"
 #include "ves/run/run.hpp"
@@ -43,6 +44,40 @@ VehicleMatrices matrices(bool coupled) {
 /// The vehicle's energy by its matrices, from where the platform is led.
 double energy(const VehicleMatrices& m, const VehicleFactors& f, const PathPoint<6>& at) {
   return 0.5 * f.mass * at.x_dot.dot(m.M * at.x_dot) + 0.5 * f.stiffness * at.x.dot(m.K * at.x);
+}
+
+// What a floating base would have done for a momentum p that was learnt late: each change of p
+// moves it by that over the mass of its time, and a change of its mass leaves its velocity alone.
+TEST(VehicleChange, LeavesWhatIsLearntLateItsVelocity) {
+  constexpr double kTwice = 2.0;
+  const Mat6 M = matrices(false).M, none = Mat6::Zero();
+  AdmittanceModel base(modesOf(M, none, none), kTickSeconds);
+  base.reset(Vec6::Zero());
+  Hindsight hindsight(kTickSeconds);
+  Lesson lesson;
+  lesson.momentum = MassColumns::Zero(6, 4);
+  hindsight.reset(base, lesson);
+  const Vec6 p1 = (Vec6() << 3.0, -1.0, 2.0, 0.4, 0.3, -0.2).finished(), p2 = -0.5 * p1;
+  constexpr int kMoves = 50, kSlides = 40;  // [-] ticks
+  Vec6 x = Vec6::Zero(), expected = Vec6::Zero();
+  const auto step = [&](const Vec6& p, const Vec6& x_dot) {
+    lesson.momentum.col(0) = p;
+    hindsight.step(base, none, kTickSeconds, lesson);
+    expected += kTickSeconds * x_dot;
+  };
+  const Vec6 v1 = -inverse(M) * p1, v2 = v1 - inverse(M) * (p2 - p1) / kTwice;
+  for (int k = 0; k < kMoves; ++k) step(p1, v1);
+  base.become({kTwice, 1.0, 1.0});
+  for (int k = 0; k < kMoves; ++k) step(p1, v1);
+  for (int k = 0; k < kMoves; ++k) step(p2, v2);
+  for (int k = 0; k < kSlides; ++k) {
+    lesson.learnt = k == 0 ? MassVector(MassVector::Unit(4, 0)) : MassVector();
+    step(p2, v2);
+    if (!hindsight.any()) continue;
+    const double rest = (kSlides - 1 - k) * kTickSeconds;
+    x += base.dynamics().Phi() * (hindsight.due().eta + rest * hindsight.due().eta_dot);
+  }
+  EXPECT_LT((x - expected).norm(), 1e-12 + 1e-9 * expected.norm());
 }
 
 TEST(VehicleChange, LeadsToTheVehicleThatItsMatricesDescribe) {

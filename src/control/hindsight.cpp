@@ -17,7 +17,8 @@ void Hindsight::reset(const AdmittanceModel& model, const Lesson& lesson) noexce
   eta_.setZero(k, n);
   eta_dot_.setZero(k, n);
   momentum_.resize(k, n);
-  momentum_.noalias() = base.Phi().transpose() * lesson.momentum / model.factors().mass;
+  mass_ = model.factors().mass;
+  momentum_.noalias() = base.Phi().transpose() * lesson.momentum / mass_;
   withheld_ = passed_ = owed_ = due_ = past_[0] = base.atRest();
   kept_ = 1;
   remaining_ = 0;
@@ -30,6 +31,10 @@ void Hindsight::step(const AdmittanceModel& model, const Mat6& M_1, double dt,
   if (!(dt > 0.0)) return;
   const ModalDynamics& base = model.dynamics();
   const double mass = model.factors().mass;
+  if (mass != mass_) {  // its velocity stays
+    momentum_ = (mass_ * momentum_ + (mass - mass_) * eta_dot_) / mass;
+    mass_ = mass;
+  }
   const ModalDynamics::Body body = base.body(M_1 / mass);
   const ModalDynamics::Forces none = ModalDynamics::Forces::Zero(base.size());
   if (lesson.momentum.cols() == eta_.cols() && lesson.hand >= 0) {

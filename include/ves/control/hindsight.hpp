@@ -52,6 +52,7 @@ class Hindsight {
   double period_;                         // [s]
   int slide_;                             // [-] steps over which a correction is given
   Sensitivity eta_, eta_dot_, momentum_;  // of the modes per parameter; momentum of base and robot
+  double mass_ = 1.0;                     // [-] of the base, that momentum_ is over
   Modes withheld_;                        // what the base has not done,
   Modes passed_;                          // and what it has, of what it was given of late
   std::array<Modes, kKept> past_{};       // a ring, the newest at kept_ - 1
