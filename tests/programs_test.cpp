@@ -204,9 +204,12 @@ TEST_F(Programs, AStopLeavesItsLastSecondsAsALog) {
   for (const auto& entry : fs::directory_iterator(folder_ / "a"))
     if (entry.path().filename().string().rfind("flight-", 0) == 0) record = entry.path();
   ASSERT_FALSE(record.empty());
-  const Output rows = sh(app("collect") + record + " --select phase");
-  EXPECT_EQ(rows.status, 0) << rows.text;
-  EXPECT_EQ(std::count(rows.text.begin(), rows.text.end(), '\n'), 501);  // 5 s, and the header
+  const std::string rows = (folder_ / "rows.csv").string();
+  const Output o2 = sh(app("collect") + record + " --select phase --out " + rows);
+  EXPECT_EQ(o2.status, 0) << o2.text;
+  EXPECT_EQ(o2.text, "");
+  std::ifstream csv(rows);
+  EXPECT_EQ(std::count(std::istreambuf_iterator<char>(csv), {}, '\n'), 501);  // 5 s, and the header
 }
 
 TEST_F(Programs, ReplayRefusesWhatIsNoLog) {

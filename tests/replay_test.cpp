@@ -9,6 +9,7 @@
 #include "support/refusal.hpp"
 #include "support/rig.hpp"
 #include "ves/bus/channels.hpp"
+#include "ves/run/flight_record.hpp"
 #include "ves/run/replay.hpp"
 #include "ves/run/run.hpp"
 #include "ves/series/series.hpp"
@@ -91,6 +92,31 @@ TEST_F(Replay, RepeatsALogWhoseEventsCameTwiceOrLate) {
   const std::vector<Column> all = columns(straight.experiment);
   for (std::size_t i = 0; i < straight.rows.size(); ++i)
     ASSERT_EQ(csvRow(all, put_right.rows[i]), csvRow(all, straight.rows[i])) << i;
+}
+
+// A tick whose sample is late runs on that of the tick before.
+TEST(FlightRecord, HoldsASampleOnceHoweverManyTicksRanOnIt) {
+  constexpr int kTicks = 40, kStop = 3;
+  const fs::path folder = fs::temp_directory_path() / ("ves_flight_" + std::to_string(getpid()));
+  fs::create_directory(folder);
+  const Experiment e = test::experiment("z_sine");
+  std::optional<FlightRecord> flight(std::in_place, e, folder);
+  for (int k = 0; k < kTicks; ++k) {
+    state_t state{};
+    sample_t sample{};
+    state.header.sequence = state.count = k;
+    state.header.time_ns = k * e.controller.period;
+    sample.header.sequence = state.sample_sequence = k - k % 3;
+    if (k >= kStop) state.phase = static_cast<int>(Phase::kStopped);
+    state.cause_tick = kStop;
+    flight->keep(state, sample);
+  }
+  flight.reset();
+  const Series series = readSeries((folder / "flight-3.lcmlog").string());
+  EXPECT_FALSE(series.damage.any()) << series.damage.first();
+  EXPECT_EQ(series.rows.size(), kStop + 21u);
+  for (const Row& row : series.rows) EXPECT_TRUE(row.has_sample) << row.state.count;
+  fs::remove_all(folder);
 }
 
 TEST_F(Replay, ALogWithoutAConfigurationIsReadWithOne) {

@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 #include "ves/bus/channels.hpp"
 #include "ves/bus/event_log.hpp"
 
@@ -50,9 +52,12 @@ void FlightRecord::write(std::int64_t tick) const {
   try {
     LogWriter log(file);
     log.write(channel::kExperiment, describe(experiment_, {}, 0), 0);
+    std::int64_t last = -1;
     for (std::size_t i = 0; i < written_ticks_.size(); ++i) {
       const Tick& t = written_ticks_[(written_next_ + i) % written_ticks_.size()];
-      log.write(channel::kSample, t.sample, t.state.header.time_ns);
+      // A tick whose sample is late runs on that of the tick before.
+      if (std::exchange(last, t.state.sample_sequence) != t.state.sample_sequence)
+        log.write(channel::kSample, t.sample, t.state.header.time_ns);
       log.write(channel::kState, t.state, t.state.header.time_ns);
     }
   } catch (const InputError& error) {
