@@ -1,16 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // ves identify: what the machine can find out about itself.
-#include <ctime>
-
 #include "commands.hpp"
 #include "runner.hpp"
-#include "ves/config/masses.hpp"
-#include "ves/config/servo.hpp"
-#include "ves/evaluation/static_intervals.hpp"
+#include "ves/evaluation/identified.hpp"
 #include "ves/identification/scenario.hpp"
-#include "ves/identification/sensor_timing.hpp"
-#include "ves/identification/servo_identification.hpp"
 #include "ves/validation/iterative_compensation.hpp"
 
 namespace ves::app {
@@ -37,10 +31,10 @@ int keep(const std::string& file, const std::string& yaml, const auto& read) {
   return kDone;
 }
 
-int plan(const std::string& scenario, const PosePlanOptions& options, double speed,
-         std::string file) {
+int plan(const std::string& scenario, const std::vector<std::string>& overrides,
+         const PosePlanOptions& options, std::string file) {
   const std::filesystem::path base = findScenario(scenario, configFolder());
-  const Experiment e = loadExperiment(base);
+  const Experiment e = loadExperiment(base, overrides);
   printWarnings(e);
   if (e.robot.joint_names.empty())
     throw InputError(fmt::format("{}: has no robot with joints to identify", base.string()));
@@ -60,9 +54,12 @@ int plan(const std::string& scenario, const PosePlanOptions& options, double spe
                     "sensor's biases",
                     options.attitudes, options.poses, combinations.rank()));
   const std::filesystem::path folder = std::filesystem::absolute(file).parent_path();
-  const std::string from =
-      std::filesystem::proximate(std::filesystem::absolute(base), folder).string();
-  writeFile(file, scenarioOf(plan, e, name, from, speed));
+  std::filesystem::path from = std::filesystem::proximate(std::filesystem::absolute(base), folder);
+  if (!overrides.empty()) {  // what it builds on is no file yet
+    from = std::filesystem::path(file).stem().string() + "_base.yaml";
+    writeFile(folder / from, e.source.resolved);
+  }
+  writeFile(file, scenarioOf(plan, e, name, from.string()));
   loadExperiment(file);  // what is refused is refused now
   fmt::print(
       "{} of {} parameters can be told apart; condition number {:.1f}, of random poses "
@@ -71,27 +68,18 @@ int plan(const std::string& scenario, const PosePlanOptions& options, double spe
   return kDone;
 }
 
-std::vector<StaticInterval> restsIn(const Series& series, const std::string& log) {
-  std::vector<StaticInterval> rests = staticIntervals(series);
-  if (rests.empty())
-    throw InputError(fmt::format("{}: platform and robot never stand still for a second", log));
-  return rests;
-}
-
 int masses(const std::string& log, const std::string& scenario, const std::string& file) {
   const Series series = seriesOf(log, scenario);
   const Experiment& e = series.experiment;
-  const std::vector<StaticInterval> rests = restsIn(series, log);
-  const StaticSetup setup = staticSetup(e.controller);
-  const SeparableCombinations combinations =
-      orRefuse(log, [&] { return separableCombinations(setup.robot); });
-  const MassEstimate m = orRefuse(log, [&] { return estimateMasses(setup, combinations, rests); });
+  const IdentifiedMasses found = orRefuse(log, [&] { return identifiedMasses(series); });
+  const SeparableCombinations& combinations = found.combinations;
+  const MassEstimate& m = found.estimate;
 
   std::string text = fmt::format(
       "Mass parameters of the robot of '{}' from {} poses at rest, by ves identify.\n"
       "{} of {} can be told apart (lengths in m, each link in its own frame, all plates counted\n"
       "into link 0):\n\n",
-      e.name, rests.size(), combinations.rank(), combinations.C.cols());
+      e.name, found.rests.size(), combinations.rank(), combinations.C.cols());
   int mixed = 0;
   for (Eigen::Index i = 0; i < combinations.rank(); ++i) {
     const bool poor = m.inflation(i) > MassEstimate::kMixed;
@@ -114,14 +102,8 @@ int masses(const std::string& log, const std::string& scenario, const std::strin
         mixed, MassEstimate::kMixed);
   if (file.empty()) return kDone;
 
-  const Eigen::VectorXd full = completed(combinations, m.beta, massParameters(setup.robot));
-  MassRecord record;
-  record.date = std::time(nullptr);
-  record.kinematics = kinematicsOf(e.controller.payload);
-  for (Eigen::Index i = 0; i < full.size(); i += 4)
-    record.bodies.push_back({full(i), full.segment<3>(i + 1)});
   const std::string yaml =
-      write(record,
+      write(found.record,
             text + "\nBelow: one set of masses that has all of these. Single values mean little.");
   return keep(file, yaml, readMasses);
 }
@@ -129,40 +111,8 @@ int masses(const std::string& log, const std::string& scenario, const std::strin
 /// The servos from any log in which every leg moves both ways.
 int servo(const std::string& log, const std::string& scenario, const std::string& file) {
   const Series series = seriesOf(log, scenario);
-  const ControllerConfig& c = series.experiment.controller;
-  // The longest stretch under command without a gap.
-  struct {
-    LegRecord legs;
-    ShakeRecord shake;
-  } longest, record;
-  std::int64_t last = -1;
-  for (const Row& row : series.rows) {
-    const auto sample = row.has_sample ? fromMessage(row.sample) : std::nullopt;
-    const bool usable = row.state.engaged && sample;
-    if (!usable || row.state.header.sequence != last + 1) record = {};
-    last = row.state.header.sequence;
-    if (!usable) continue;
-    LegCounts sent{};
-    std::copy_n(row.state.counts, kLegs, sent.begin());
-    const Vec6 reference = legLengths(c.legs, sent);
-    // When a command came the next sample tells.
-    if (!record.legs.sent.empty() && sample->command_tick == record.shake.tick.back())
-      record.legs.sent.back() = sample->command_time;
-    record.legs.reference.push_back(reference);
-    record.legs.sent.push_back(row.state.machine_time_ns);
-    record.legs.length.push_back(legLengths(c.legs, sample->legs));
-    record.legs.read.push_back(sample->legs_time);
-    record.shake.tick.push_back(row.state.header.sequence);
-    record.shake.time.push_back(row.state.machine_time_ns);
-    record.shake.reference.push_back(reference);
-    record.shake.sample.push_back(*sample);
-    record.shake.bias.push_back(Vec6::Map(row.state.bias));
-    if (record.legs.length.size() > longest.legs.length.size()) longest = record;
-  }
-  const ServoEstimate found = orRefuse(log, [&] {
-    return identifyServo(c.servo, static_cast<double>(c.period) * kSecondPerNanosecond,
-                         longest.legs);
-  });
+  const IdentifiedServo all = orRefuse(log, [&] { return identifiedServo(series); });
+  const ServoEstimate& found = all.legs;
   fmt::print("{:>3}{:>22}{:>22}{:>20}{:>20}{:>12}\n", "leg", "extending [1/s]", "retracting [1/s]",
              "tau [ms]", "delay [ms]", "rest [um]");
   for (int i = 0; i < kLegs; ++i) {
@@ -174,24 +124,16 @@ int servo(const std::string& log, const std::string& scenario, const std::string
                cell(&ServoModel::retract, 1.0), cell(&ServoModel::tau, 1e3),
                cell(&ServoModel::delay, 1e3), found.residual(i) * 1e6);
   }
-  ServoRecord kept{std::time(nullptr), found.servo, found.deviation};
-  try {
-    ControllerConfig known = c;
-    known.servo = found.servo;
-    const SensorEstimate sensor = identifySensor(known, longest.shake);
-    kept.servo.sensor_delay = sensor.delay;
-    kept.servo.sensor_scale = sensor.scale;
-    kept.deviation.sensor_delay = sensor.delay_deviation;
-    kept.deviation.sensor_scale = sensor.scale_deviation;
+  if (all.sensor)
     fmt::print(
         "wrench: {:.0f} +- {:.0f} us later than the servos and its filter say; shows {:.4f} +- "
         "{:.4f} of the robot's inertia\n",
-        1e6 * sensor.delay, 1e6 * sensor.delay_deviation, sensor.scale, sensor.scale_deviation);
-  } catch (const std::domain_error& why) {
-    fmt::print("wrench: its time is not told, {}\n", why.what());
-  }
+        1e6 * all.sensor->delay, 1e6 * all.sensor->delay_deviation, all.sensor->scale,
+        all.sensor->scale_deviation);
+  else
+    fmt::print("wrench: its time is not told, {}\n", all.why);
   if (file.empty()) return kDone;
-  return keep(file, write(kept), readServo);
+  return keep(file, write(all.record), readServo);
 }
 
 int iterate(Options& load, const IterativeOptions& options, const std::string& file) {
@@ -228,10 +170,13 @@ int identifyCommand(int argc, char** argv) {
   cli.require_subcommand(1);
   std::string name, file, scenario;
   PosePlanOptions options;
-  double tilt = options.tilt / kDegree, speed = 30.0;
+  std::vector<std::string> overrides;
+  double tilt = options.tilt / kDegree;
   CLI::App* of_plan = cli.add_subcommand(
       "plan", "poses from which a scenario's robot is well identified, as a scenario to run");
   of_plan->add_option("scenario", name, "name in config/scenarios, or a .yaml file")->required();
+  of_plan->add_option("--set", overrides, "KEY.PATH=VALUE as if it stood in the scenario")
+      ->allow_extra_args(false);
   of_plan->add_option("--attitudes", options.attitudes, "of the platform")
       ->check(CLI::Range(1, kMaxSegments / 3))
       ->capture_default_str();
@@ -241,7 +186,7 @@ int identifyCommand(int argc, char** argv) {
   of_plan->add_option("--tilt", tilt, "most about x and about y [deg]")
       ->check(inRange(0.1, 85.0))
       ->capture_default_str();
-  of_plan->add_option("--joint-speed", speed, "mean, of the robot's joints [deg/s | cm/s]")
+  of_plan->add_option("--joint-speed", options.speed, "mean, of the robot's joints [deg/s | cm/s]")
       ->check(inRange(0.1, 1000.0))
       ->capture_default_str();
   of_plan->add_option("--seed", options.seed, "of the search")
@@ -291,7 +236,7 @@ int identifyCommand(int argc, char** argv) {
     if (of_masses->parsed()) return masses(name, scenario, file);
     if (of_servo->parsed()) return servo(name, scenario, file);
     options.tilt = tilt * kDegree;
-    return plan(name, options, speed, file);
+    return plan(name, overrides, options, file);
   });
 }
 

@@ -17,10 +17,11 @@ namespace ves {
 namespace {
 
 /// After few exchanges: inside the limits, not yet good.
-PosePlan quickPlan(const Experiment& e) {
+PosePlan quickPlan(const Experiment& e, double speed = 30.0) {
   const StaticSetup setup = staticSetup(e.controller);
   PosePlanOptions few;
   few.exchanges = 50;
+  few.speed = speed;
   return planPoses(setup, separableCombinations(setup.robot), e.controller,
                    e.plant.task.initial_joints, few);
 }
@@ -70,12 +71,12 @@ TEST(PosePlan, OfARangeWithoutEndTakesWhatLiesAboutZero) {
 
 TEST(PosePlan, ItsScenarioMovesNoJointFasterThanAsked) {
   const Experiment e = test::experiment("doss_on_table_4_1");
-  const PosePlan plan = quickPlan(e);
   const double speed = 25.0;  // [deg/s | cm/s]
+  const PosePlan plan = quickPlan(e, speed);
   const auto file = std::filesystem::temp_directory_path() /
                     ("ves_pose_plan_" + std::to_string(getpid()) + ".yaml");
   std::ofstream(file) << scenarioOf(plan, e, "plan",
-                                    test::configDir() + "/scenarios/doss_on_table_4_1.yaml", speed);
+                                    test::configDir() + "/scenarios/doss_on_table_4_1.yaml");
   const Experiment planned = loadExperiment(file);
   std::filesystem::remove(file);
   JointVector at = planned.plant.task.initial_joints;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <random>
 #include <stdexcept>
+#include <utility>
 
 #include "ves/control/path_checks.hpp"
 #include "ves/math/dense.hpp"
@@ -44,26 +45,28 @@ class Planner {
     // Columns at their usual length.
     MatrixXd information = of(out);
     scale_ = information.diagonal().cwiseSqrt().cwiseInverse();
+    takeTimes(out);
     out.condition = out.condition_random = condition(information);
+    double least = cost(out);
     for (int i = 0; i < options_.exchanges; ++i) {
       const std::size_t which = below(out.attitudes.size());
-      const PosePlan::Attitude old = out.attitudes[which];
-      PosePlan::Attitude changed = old;
+      const PosePlan old = out;
+      PosePlan::Attitude& changed = out.attitudes[which];
       if (i % (options_.poses + 1) == 0)
         changed.rpy = attitude();
       else
         changed.q[below(changed.q.size())] = pose();
-      const MatrixXd next = information - of(old) + of(changed);
-      const double c = condition(next);
-      if (!(c < out.condition)) continue;
-      out.attitudes[which] = changed;
-      if (!passable(out, which)) {
-        out.attitudes[which] = old;
-        continue;
+      const MatrixXd next = information - of(old.attitudes[which]) + of(changed);
+      out.condition = condition(next);
+      takeTimes(out);
+      if (cost(out) < least && passable(out, which)) {
+        least = cost(out);
+        information = next;
+      } else {
+        out = old;
       }
-      out.condition = c;
-      information = next;
     }
+    out.deviation = deviation(information, out.attitudes.size() * out.attitudes.front().q.size());
     return out;
   }
 
@@ -90,10 +93,12 @@ class Planner {
     for (int k = 0; k < setup_.robot.joints; ++k) {
       const Link& link = setup_.robot.jointLink(k);
       const double most = link.type == JointType::kRevolute ? M_PI : 1.0;
+      constexpr double kInside = 0.45;  // [-] of the range, either way from its middle
       // Of a long range, what lies about its middle; of one without end, about zero.
       const bool ends = std::isfinite(link.lower) && std::isfinite(link.upper);
       const double middle = ends ? 0.5 * (link.lower + link.upper) : 0.0;
-      q(k) = between(std::max(link.lower, middle - most), std::min(link.upper, middle + most));
+      const double half = ends ? std::min(kInside * (link.upper - link.lower), most) : most;
+      q(k) = between(std::max(link.lower, middle - half), std::min(link.upper, middle + half));
     }
     return q;
   }
@@ -160,6 +165,48 @@ class Planner {
     return values(0) > 0.0 ? std::sqrt(values(values.size() - 1) / values(0)) : HUGE_VAL;
   }
 
+  double moving(const JointVector& from, const JointVector& to) const {
+    double time = 1.0;
+    for (int i = 0; i < setup_.robot.joints; ++i) {
+      const bool turns = setup_.robot.jointLink(i).type == JointType::kRevolute;
+      const double one = std::abs(to(i) - from(i)) / (options_.speed * (turns ? kDegree : 0.01));
+      time = std::max(time, std::ceil(one * 10.0) / 10.0);
+    }
+    return time;
+  }
+
+  void takeTimes(PosePlan& plan) const {
+    Stand at{Vec3::Zero(), start_};
+    plan.seconds = 0.0;
+    for (PosePlan::Attitude& a : plan.attitudes) {
+      const double turning =
+          kQuinticPeakRate * (a.rpy - at.rpy).norm() / controller_.gentle.rotation;
+      a.moving.clear();
+      for (const JointVector& q : a.q) {
+        a.moving.push_back(moving(at.q, q));
+        at.q = q;
+      }
+      a.moving.front() = std::max(std::ceil(turning * 10.0) / 10.0, a.moving.front());
+      at.rpy = a.rpy;
+      plan.seconds += PosePlan::kApproach;
+      for (const double time : a.moving) plan.seconds += time + PosePlan::kLook;
+    }
+  }
+
+  double cost(const PosePlan& plan) const {
+    const double over = std::max(1.0, plan.seconds / options_.most_seconds);
+    return plan.condition * over * over * over * over;
+  }
+
+  double deviation(const MatrixXd& information, std::size_t looks) const {
+    const Eigen::Index r = combinations_.rank();
+    const VectorXd beta = combinations_.C * masses_;
+    const MatrixXd covariance =
+        solvePositive(information, MatrixXd::Identity(r + 6, r + 6)).topLeftCorner(r, r);
+    const MatrixXd square = information.topLeftCorner(r, r) / static_cast<double>(looks);
+    return std::sqrt((covariance * square).trace() / beta.dot(square * beta));
+  }
+
   static constexpr int kPatience = 10000;
   const StaticSetup& setup_;
   const SeparableCombinations& combinations_;
@@ -178,6 +225,22 @@ PosePlan planPoses(const StaticSetup& setup, const SeparableCombinations& combin
                    const ControllerConfig& controller, const JointVector& start,
                    const PosePlanOptions& options) {
   return Planner(setup, combinations, controller, start, options).plan();
+}
+
+PosePlan planFewestPoses(const StaticSetup& setup, const SeparableCombinations& combinations,
+                         const ControllerConfig& controller, const JointVector& start,
+                         const PosePlanOptions& options, double accuracy) {
+  // So many equations for the combinations, six biases and their drift, and some to judge by.
+  const int unknowns = static_cast<int>(combinations.rank()) + 12;
+  PosePlanOptions few = options;
+  few.attitudes = std::max(3, (unknowns + 12 + 6 * few.poses - 1) / (6 * few.poses));
+  PosePlan best = planPoses(setup, combinations, controller, start, few);
+  while (best.deviation > accuracy && ++few.attitudes <= options.attitudes) {
+    PosePlan more = planPoses(setup, combinations, controller, start, few);
+    if (more.seconds > options.most_seconds) break;
+    if (more.deviation < best.deviation) best = std::move(more);
+  }
+  return best;
 }
 
 }  // namespace ves

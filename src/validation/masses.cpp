@@ -34,8 +34,7 @@ void massesSection(Reproduction& r) {
     const SeparableCombinations c = separableCombinations(setup.robot);
     const PosePlan plan = planPoses(setup, c, e.controller, e.plant.task.initial_joints, {});
     const fs::path file = piece.scratch / ("identify_" + robot + ".yaml");
-    constexpr double kSpeed = 30.0;  // [deg/s]
-    std::ofstream(file) << scenarioOf(plan, e, "identify_" + robot, base.string(), kSpeed);
+    std::ofstream(file) << scenarioOf(plan, e, "identify_" + robot, base.string());
     const Reproduction::Run run = piece.record("identify " + robot, loadExperiment(file));
     fs::remove(file);
     const std::vector<StaticInterval> intervals = staticIntervals(run.series);

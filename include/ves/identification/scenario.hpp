@@ -10,9 +10,21 @@ namespace ves {
 
 StaticSetup staticSetup(const ControllerConfig& controller);
 
+/// A fifth-order motion of all joints at once.
+struct TimedMove {
+  double start = 0.0, duration = 0.0;    // [s] in its segment
+  JointVector to = JointVector::Zero();  // [rad | m]
+};
+
+/// YAML of them, as a segment's `robot:`; empty where there is nothing to move.
+std::string robotMoves(const Experiment& experiment, const std::vector<TimedMove>& moves);
+
+/// YAML of segments that go through the plan, from home and the joints it begins with.
+std::string programOf(const PosePlan& plan, const Experiment& experiment);
+
 /// YAML of a scenario that goes through the plan; `from` is the file it builds on, as seen from
-/// where it will lie. Joints go `speed` [deg/s | cm/s] on average.
+/// where it will lie.
 std::string scenarioOf(const PosePlan& plan, const Experiment& experiment, const std::string& name,
-                       const std::string& from, double speed);
+                       const std::string& from);
 
 }  // namespace ves

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// What a recorded run tells of the machine: masses of its robot, servos of its legs, time and scale
+// of its force sensor, each as the record that a controller takes.
+#pragma once
+
+#include "ves/config/masses.hpp"
+#include "ves/config/servo.hpp"
+#include "ves/identification/mass_parameters.hpp"
+#include "ves/identification/sensor_timing.hpp"
+#include "ves/identification/servo_identification.hpp"
+#include "ves/series/series.hpp"
+
+namespace ves {
+
+struct IdentifiedMasses {
+  SeparableCombinations combinations;
+  MassEstimate estimate;
+  std::vector<StaticInterval> rests;
+  MassRecord record;
+};
+
+/// From the stretches in which platform and robot stand still. Throws std::domain_error where they
+/// do not tell.
+IdentifiedMasses identifiedMasses(const Series& series);
+
+struct IdentifiedServo {
+  ServoEstimate legs;
+  std::optional<SensorEstimate> sensor;
+  std::string why;  // there is no `sensor`
+  ServoRecord record;
+};
+
+/// From the longest stretch under command without a gap, which moves every leg both ways. Throws
+/// std::domain_error where it does not tell.
+IdentifiedServo identifiedServo(const Series& series);
+
+}  // namespace ves

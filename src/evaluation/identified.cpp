@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/evaluation/identified.hpp"
+
+#include <algorithm>
+#include <ctime>
+#include <stdexcept>
+#include <utility>
+
+#include "ves/evaluation/static_intervals.hpp"
+#include "ves/identification/scenario.hpp"
+
+namespace ves {
+namespace {
+
+struct MotionRecord {
+  LegRecord legs;
+  ShakeRecord shake;
+};
+
+/// The longest stretch under command without a gap.
+MotionRecord longestMotion(const Series& series) {
+  MotionRecord longest, record;
+  std::int64_t last = -1;
+  for (const Row& row : series.rows) {
+    const auto sample = row.has_sample ? fromMessage(row.sample) : std::nullopt;
+    const bool usable = row.state.engaged && sample;
+    if (!usable || row.state.header.sequence != last + 1) record = {};
+    last = row.state.header.sequence;
+    if (!usable) continue;
+    LegCounts sent{};
+    std::copy_n(row.state.counts, kLegs, sent.begin());
+    const ControllerConfig& c = series.experiment.controller;
+    const Vec6 reference = legLengths(c.legs, sent);
+    // When a command came the next sample tells.
+    if (!record.legs.sent.empty() && sample->command_tick == record.shake.tick.back())
+      record.legs.sent.back() = sample->command_time;
+    record.legs.reference.push_back(reference);
+    record.legs.sent.push_back(row.state.machine_time_ns);
+    record.legs.length.push_back(legLengths(c.legs, sample->legs));
+    record.legs.read.push_back(sample->legs_time);
+    record.shake.tick.push_back(row.state.header.sequence);
+    record.shake.time.push_back(row.state.machine_time_ns);
+    record.shake.reference.push_back(reference);
+    record.shake.sample.push_back(*sample);
+    record.shake.bias.push_back(Vec6::Map(row.state.bias));
+    if (record.legs.length.size() > longest.legs.length.size()) longest = record;
+  }
+  return longest;
+}
+
+}  // namespace
+
+IdentifiedMasses identifiedMasses(const Series& series) {
+  IdentifiedMasses out;
+  out.rests = staticIntervals(series);
+  if (out.rests.empty())
+    throw std::domain_error("platform and robot never stand still for a second");
+  const StaticSetup setup = staticSetup(series.experiment.controller);
+  out.combinations = separableCombinations(setup.robot);
+  out.estimate = estimateMasses(setup, out.combinations, out.rests);
+  const Eigen::VectorXd full =
+      completed(out.combinations, out.estimate.beta, massParameters(setup.robot));
+  out.record.date = std::time(nullptr);
+  out.record.kinematics = kinematicsOf(series.experiment.controller.payload);
+  for (Eigen::Index i = 0; i < full.size(); i += 4)
+    out.record.bodies.push_back({full(i), full.segment<3>(i + 1)});
+  return out;
+}
+
+IdentifiedServo identifiedServo(const Series& series) {
+  const ControllerConfig& c = series.experiment.controller;
+  const MotionRecord record = longestMotion(series);
+  IdentifiedServo out;
+  out.legs = identifyServo(c.servo, c.periodSeconds(), record.legs);
+  out.record = {std::time(nullptr), out.legs.servo, out.legs.deviation};
+  try {
+    ControllerConfig known = c;
+    known.servo = out.legs.servo;
+    out.sensor = identifySensor(known, record.shake);
+    out.record.servo.sensor_delay = out.sensor->delay;
+    out.record.servo.sensor_scale = out.sensor->scale;
+    out.record.deviation.sensor_delay = out.sensor->delay_deviation;
+    out.record.deviation.sensor_scale = out.sensor->scale_deviation;
+  } catch (const std::domain_error& why) {
+    out.why = why.what();
+  }
+  return out;
+}
+
+}  // namespace ves
