@@ -144,7 +144,7 @@ struct Options {
   std::string scenario;
   std::vector<std::string> overrides;
   std::int64_t seed = -1;
-  std::string calibration, masses, servo;
+  BeliefFiles belief;
   bool force = false;
   bool verbose = false, quiet = false;
   bool private_bus = false;
@@ -157,9 +157,11 @@ struct Options {
         ->allow_extra_args(false);
     cli.add_option("--seed", seed, "of the plant's noise")
         ->check(CLI::Range(std::int64_t{0}, std::int64_t{UINT32_MAX}));
-    cli.add_option("--calibration", calibration, "file that a calibration has left");
-    cli.add_option("--masses", masses, "file that an identification has left, for the controller");
-    cli.add_option("--servo", servo,
+    cli.add_option("--belief", belief.belief, "file that a commissioning has left: all of these");
+    cli.add_option("--calibration", belief.calibration, "file that a calibration has left");
+    cli.add_option("--masses", belief.masses,
+                   "file that an identification has left, for the controller");
+    cli.add_option("--servo", belief.servo,
                    "file that a servo identification has left, for the controller");
     cli.add_flag("--verbose", verbose, "also what is known to be odd in the robot's file");
   }
@@ -197,8 +199,7 @@ struct Options {
     std::vector<std::string> all = overrides;
     if (seed >= 0) all.push_back(fmt::format("seed={}", seed));
     if (force) all.push_back("controller.stability=forced");
-    Experiment experiment =
-        loadExperiment(findScenario(scenario, configFolder()), all, calibration, masses, servo);
+    Experiment experiment = loadExperiment(findScenario(scenario, configFolder()), all, belief);
     process.url = withKey(process.url, experiment.key_file);
     return experiment;
   }
@@ -313,6 +314,26 @@ inline int run(CLI::App& cli, int argc, char** argv, const std::function<int()>&
     fmt::print(stderr, "{}: {}\n", cli.get_name(), shortened(error.what()));
     return kBadInput;
   }
+}
+
+/// A title and columns beneath each other.
+inline void printTable(const std::string& title, const std::vector<std::string>& header,
+                       const std::vector<std::vector<std::string>>& rows) {
+  fmt::print("{}\n", title);
+  if (rows.empty()) fmt::print("  nothing\n");
+  std::vector<std::size_t> widths(header.size());
+  for (std::size_t i = 0; i < header.size(); ++i) {
+    widths[i] = header[i].size();
+    for (const auto& row : rows) widths[i] = std::max(widths[i], row[i].size());
+  }
+  const auto line = [&](const std::vector<std::string>& cells) {
+    fmt::print("  {:<{}}", cells[0], widths[0]);
+    for (std::size_t i = 1; i < cells.size(); ++i) fmt::print("  {:>{}}", cells[i], widths[i]);
+    fmt::print("\n");
+  };
+  if (!rows.empty()) line(header);
+  for (const auto& row : rows) line(row);
+  fmt::print("\n");
 }
 
 inline void printDamage(const Damage& damage) {

@@ -76,25 +76,6 @@ std::vector<std::vector<std::string>> resultsOf(std::vector<KeyDifference> diffe
   return rows;
 }
 
-void print(const std::string& title, const std::vector<std::string>& header,
-           const std::vector<std::vector<std::string>>& rows) {
-  fmt::print("{}\n", title);
-  if (rows.empty()) fmt::print("  nothing\n");
-  std::vector<std::size_t> widths(header.size());
-  for (std::size_t i = 0; i < header.size(); ++i) {
-    widths[i] = header[i].size();
-    for (const auto& row : rows) widths[i] = std::max(widths[i], row[i].size());
-  }
-  const auto line = [&](const std::vector<std::string>& cells) {
-    fmt::print("  {:<{}}", cells[0], widths[0]);
-    for (std::size_t i = 1; i < cells.size(); ++i) fmt::print("  {:>{}}", cells[i], widths[i]);
-    fmt::print("\n");
-  };
-  if (!rows.empty()) line(header);
-  for (const auto& row : rows) line(row);
-  fmt::print("\n");
-}
-
 /// A column of all runs, over the time since each began.
 Panel panelOf(const std::vector<ComparedRun>& runs, const std::string& column,
               const std::string& label, double scale) {
@@ -142,8 +123,8 @@ int compareCommand(int argc, char** argv) {
                results = resultsOf(summaryDifferences(summaries));
     std::vector<std::string> beside = header;
     if (runs.size() == 2) beside.push_back("second/first");
-    print("configuration", header, configuration);
-    print("results", beside, results);
+    printTable("configuration", header, configuration);
+    printTable("results", beside, results);
     if (html.empty()) return kDone;
 
     Page page;

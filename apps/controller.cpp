@@ -40,11 +40,13 @@ int serve(ControllerOptions& options) {
 std::filesystem::path findCalibration(ControllerOptions& options) {
   const std::filesystem::path kept = "ves-runs/calibration.yaml";
   std::error_code error;
-  if (!options.calibration.empty() || !std::filesystem::exists(kept, error)) return kept;
+  const BeliefFiles& named = options.belief;
+  if (!named.calibration.empty() || !named.belief.empty() || !std::filesystem::exists(kept, error))
+    return kept;
   const Value document = loadDocument(kept);
   const CalibrationRecord record = readCalibration(Section(document, ""));
   if (record.setup == options.load().source.calibrated)
-    options.calibration = kept.string();
+    options.belief.calibration = kept;
   else
     fmt::print(stderr, "warning: {} is of another sensor, robot or gravity: not used\n",
                kept.string());
@@ -54,7 +56,7 @@ std::filesystem::path findCalibration(ControllerOptions& options) {
 int console(ControllerOptions& options) {
   ConsoleOptions console;
   console.calibration = findCalibration(options);
-  if (!options.calibration.empty()) console.calibration = options.calibration;
+  if (!options.belief.calibration.empty()) console.calibration = options.belief.calibration;
   console.commands = options.commands;
   console.stop = [] { return stop_requested != 0; };
   Experiment experiment = options.load();

@@ -124,16 +124,12 @@ class ViewBeside {
   std::unique_ptr<Process> process_;
 };
 
-inline int runExperiment(RunnerOptions& options) {
-  if (options.process.lockstep && options.view && !options.process.pace) options.process.pace = 1.0;
+/// From start to its log, with a line that tells how far it is.
+inline RunResult execute(RunnerOptions& options, const Experiment& experiment,
+                         LaunchOptions& launch) {
   const bool one_process =
       options.process.lockstep && !options.two_processes && !options.process.pace;
-  Experiment experiment = options.load();
-  printWarnings(experiment, options.verbose);
-  warnOfInstability(experiment);
-  LaunchOptions launch = prepareFolder(options, experiment);
   catchSignals();
-
   Progress progress(experiment);
   RunResult result;
   std::optional<ViewBeside> view;
@@ -161,6 +157,16 @@ inline int runExperiment(RunnerOptions& options) {
         [] { return stop_requested != 0; });
   }
   progress.end();
+  return result;
+}
+
+inline int runExperiment(RunnerOptions& options) {
+  if (options.process.lockstep && options.view && !options.process.pace) options.process.pace = 1.0;
+  Experiment experiment = options.load();
+  printWarnings(experiment, options.verbose);
+  warnOfInstability(experiment);
+  LaunchOptions launch = prepareFolder(options, experiment);
+  const RunResult result = execute(options, experiment, launch);
   const std::string table = writeResults(launch.scenario.parent_path(), result, options.plots);
   if (!options.quiet) fmt::print("{}", table);
   return statusOf(result);

@@ -26,6 +26,7 @@ constexpr Command kCommands[] = {
     {"replay", "a recorded run through the controller again (--check: bit for bit)", replayCommand},
     {"collect", "variables of a log as CSV (--select, --rate, --list)", collectCommand},
     {"plot", "columns of a log as a picture (--select)", plotCommand},
+    {"commission", "what a machine is: one command, one belief file, one page", commissionCommand},
     {"compare", "runs side by side: configurations, results, curves", compareCommand},
     {"view", "a recorded run in three dimensions, as one file for a browser", viewCommand},
     {"keys", "what scenario files may say, with unit, range and default", keysCommand},

@@ -232,12 +232,12 @@ TEST_F(Console, AScriptCalibratesMovesCollectsAndParks) {
   // The calibration serves the next session, until the sensor is another one, or it is old.
   const fs::path kept = folder_ / "ves-runs/calibration.yaml";
   const Experiment with =
-      loadExperiment(test::configDir() + "/scenarios/puma_on_table_4_1.yaml", {}, kept);
+      loadExperiment(test::configDir() + "/scenarios/puma_on_table_4_1.yaml", {}, {.calibration = kept});
   ASSERT_TRUE(with.source.calibration);
   EXPECT_EQ(with.controller.bias, with.source.calibration->bias);
   EXPECT_LT(age(*with.source.calibration), 1.0);
   EXPECT_NE(test::refusal([&] {
-              loadExperiment(test::configDir() + "/scenarios/z_sine.yaml", {}, kept);
+              loadExperiment(test::configDir() + "/scenarios/z_sine.yaml", {}, {.calibration = kept});
             }).find("calibration.yaml:4: calibration.setup: "),
             std::string::npos);
   CalibrationRecord old = *with.source.calibration;

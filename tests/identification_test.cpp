@@ -188,6 +188,52 @@ TEST(Identification, ParametersAreWithinThreeDeviationsInNinetyNinePercent) {
   }
 }
 
+// What it says of the weight's readings is what they scatter by, and what the plan foretold of it.
+TEST(Identification, ItsDeviationIsThatOfTheWeightsReadings) {
+  const Experiment e = test::experiment("puma_on_table_4_1");
+  const StaticSetup setup = staticSetup(e.controller);
+  const SeparableCombinations c = separableCombinations(setup.robot);
+  PosePlanOptions few;
+  few.attitudes = 4;
+  const PosePlan plan = planPoses(setup, c, e.controller, e.plant.task.initial_joints, few);
+  const VectorXd truth = c.C * massParameters(setup.robot);
+  constexpr int kSeeds = 100;
+  double scatter = 0.0, said = 0.0, foretold = 0.0;
+  for (int seed = 1; seed <= kSeeds; ++seed) {
+    const auto rests = readings(e, setup, plan, static_cast<std::uint32_t>(seed));
+    const MassEstimate m = estimateMasses(setup, c, rests);
+    double off = 0.0, weight = 0.0;
+    for (const StaticInterval& rest : rests) {
+      const Eigen::MatrixXd Y = countRegressor(setup, rest.q, rest.rpy)(Eigen::all, c.leads).eval();
+      const auto weighed = [&](const VectorXd& beta) {
+        return (Y * beta).cwiseQuotient(m.residual).squaredNorm();
+      };
+      off += weighed(m.beta - truth);
+      weight += weighed(truth);
+    }
+    scatter += off / weight / kSeeds;
+    said += m.deviation * m.deviation / kSeeds;
+    foretold += std::pow(plan.deviation * m.residual.mean(), 2) / kSeeds;
+  }
+  EXPECT_NEAR(std::sqrt(scatter / said), 1.0, 0.15);
+  EXPECT_NEAR(std::sqrt(foretold / said), 1.0, 0.5);  // without drift, channels alike
+}
+
+// The composite of points on sticks, by hand.
+TEST(Identification, LeavesTheLinksOwnInertiaAsItWas) {
+  RobotModel robot = chain({joint(JointType::kRevolute, Z, Vec3::Zero())});
+  robot.base = {};
+  robot.links[0].body = {4.0, Vec3(0.5, 0.0, 0.0), Vec3(0.1, 0.2, 0.3).asDiagonal()};
+  Link second = joint(JointType::kPrismatic, X, Vec3(1.0, 0.0, 0.0));
+  second.body = {4.0, Vec3(0.5, 0.0, 0.0), Mat3::Zero()};
+  robot.extend(second);
+  // Two points of 4 kg, 1 m apart: 2 kg m^2 across, twice; and 0.6 kg m^2 of their own.
+  const double own = 0.6 / (0.6 + 4.0);
+  MassRecord record;
+  record.deviation = 0.002;
+  EXPECT_NEAR(massErrorOf(record, robot, JointVector::Zero(), 0.05), 0.006 + 0.05 * own, 1e-12);
+}
+
 TEST(Identification, BiasIsThatOfTheMiddleOfTheRests) {  // where its drift has no say
   const Experiment e = test::experiment("puma_on_table_4_1");
   const StaticSetup setup = staticSetup(e.controller);
@@ -319,15 +365,7 @@ TEST(RecordedPath, OfAScenarioIsCommanded) {
 
 // --- As a person does it -------------------------------------------------------------------------
 
-class Identify : public test::Programs {
- protected:
-  void expectRefusal(const std::string& command, const std::string& line) {
-    const test::Output out = test::sh(command);
-    EXPECT_EQ(out.status, 2) << command;
-    EXPECT_NE(out.text.find(line), std::string::npos) << out.text;
-  }
-  std::string file(const std::string& name) { return (folder_ / name).string(); }
-};
+class Identify : public test::Programs {};
 
 TEST_F(Identify, PlanRunMassesAndTheirUse) {
   for (const std::string scenario : {"puma_on_table_4_1", "doss_on_table_4_1"}) {
@@ -343,7 +381,7 @@ TEST_F(Identify, PlanRunMassesAndTheirUse) {
     // Truth is in the plant; the controller has nothing but the file.
     const Experiment e =
         loadExperiment(std::string(VES_TEST_CONFIG_DIR) + "/scenarios/" + scenario + ".yaml", {},
-                       {}, file("masses.yaml"));
+                       {.masses = file("masses.yaml")});
     EXPECT_EQ(e.controller.payload.adapter_R.mass, 0.0);
     EXPECT_GT(e.plant.payload.adapter_R.mass, 0.0);
     std::mt19937 draw(7);

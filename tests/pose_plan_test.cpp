@@ -135,5 +135,34 @@ TEST(PosePlan, IsBetterThanChanceAndInsideTheLimits) {
   }
 }
 
+// As few as the accuracy needs; and inside the time, as long as so few take it.
+TEST(PosePlan, TakesTheFewestAttitudesThatAreAccurateEnough) {
+  const Experiment e = test::experiment("puma_on_table_4_1");
+  const StaticSetup setup = staticSetup(e.controller);
+  const SeparableCombinations c = separableCombinations(setup.robot);
+  PosePlanOptions options;
+  options.attitudes = 8;
+  const auto fewest = [&](double accuracy) {
+    return planFewestPoses(setup, c, e.controller, e.plant.task.initial_joints, options, accuracy);
+  };
+  const PosePlan coarse = fewest(1.0);
+  const PosePlan fine = fewest(0.7 * coarse.deviation);
+  EXPECT_EQ(coarse.attitudes.size(), 3u);
+  EXPECT_LE(fine.deviation, 0.7 * coarse.deviation);
+  EXPECT_GT(fine.attitudes.size(), coarse.attitudes.size());
+  EXPECT_LE(fewest(1e-12).attitudes.size(), 8u);  // nothing is that accurate
+  options.most_seconds = 0.6 * coarse.seconds;
+  const PosePlan quick = fewest(1.0);
+  EXPECT_LT(quick.seconds, 0.8 * coarse.seconds);
+  // Its times are those that the moves need.
+  double seconds = 0.0;
+  for (const PosePlan::Attitude& a : quick.attitudes) {
+    ASSERT_EQ(a.moving.size(), a.q.size());
+    seconds += PosePlan::kApproach;
+    for (const double moving : a.moving) seconds += moving + PosePlan::kLook;
+  }
+  EXPECT_NEAR(quick.seconds, seconds, 1e-9);
+}
+
 }  // namespace
 }  // namespace ves

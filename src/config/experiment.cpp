@@ -122,6 +122,7 @@ Experiment build(const Value& document, AskedKey* asked = nullptr) {
   }
   if (legs.filters == plant::LegFilters::kOutputs) c.servo.filter_cutoff = legs.filter_cutoff;
   c.servo.jitter = c.compensation.jitter;
+  const double mass_error = c.compensation.mass_error;
   if (root.has("servo")) {
     const ServoRecord record = readServo(root.section("servo"));
     c.servo = withRecord(c.servo, record);
@@ -215,6 +216,11 @@ Experiment build(const Value& document, AskedKey* asked = nullptr) {
       section.fail("bodies", fmt::format("are {}, want {}: link 0 and every link that moves",
                                          masses.bodies.size(), c.payload.robot.size + 1));
     c.payload = withMasses(c.payload, masses);
+    if (masses.deviation > 0.0) {
+      const double found = massErrorOf(masses, c.payload.robot, p.task.initial_joints, mass_error);
+      double& used = c.compensation.mass_error;  // the servo's record may have said one too
+      used = used == mass_error ? found : std::max(used, found);
+    }
   }
 
   readProgram(root, out);
@@ -238,9 +244,7 @@ Experiment build(const Value& document, AskedKey* asked = nullptr) {
 }  // namespace
 
 Experiment loadExperiment(const std::filesystem::path& file,
-                          const std::vector<std::string>& overrides,
-                          const std::filesystem::path& calibration,
-                          const std::filesystem::path& masses, const std::filesystem::path& servo) {
+                          const std::vector<std::string>& overrides, const BeliefFiles& files) {
   Value document = loadDocument(file);
   // A title is of the scenario that has the name, and not of one that was built upon.
   const Value *name = document.find("name"), *title = document.find("description");
@@ -249,9 +253,19 @@ Experiment loadExperiment(const std::filesystem::path& file,
     own.text = name->text;
     document.put("description", own);
   }
-  if (!calibration.empty()) document.put("calibration", loadDocument(calibration));
-  if (!masses.empty()) document.put("masses", loadDocument(masses));
-  if (!servo.empty()) document.put("servo", loadDocument(servo));
+  if (!files.belief.empty()) {
+    const Value belief = loadDocument(files.belief);
+    Section root(belief, "");
+    for (const char* key : kBeliefKeys)
+      if (root.has(key)) {
+        root.section(key);
+        document.put(key, *belief.find(key));
+      }
+    root.finish();
+  }
+  if (!files.calibration.empty()) document.put("calibration", loadDocument(files.calibration));
+  if (!files.masses.empty()) document.put("masses", loadDocument(files.masses));
+  if (!files.servo.empty()) document.put("servo", loadDocument(files.servo));
   return buildExperiment(std::move(document), overrides);
 }
 

@@ -14,8 +14,11 @@ std::string write(const MassRecord& r, const std::string& comment) {
   std::istringstream lines(comment);
   for (std::string line; std::getline(lines, line);)
     text += line.empty() ? "#\n" : "# " + line + "\n";
-  text += fmt::format("date: {}\nkinematics: {}  # hash of the geometry it holds for\nbodies:\n",
+  text += fmt::format("date: {}\nkinematics: {}  # hash of the geometry it holds for\n",
                       dateText(r.date), r.kinematics);
+  if (r.deviation > 0.0)
+    text += fmt::format("deviation: {:.3g}  # share of the weight's wrench\n", r.deviation);
+  text += "bodies:\n";
   for (const MassRecord::Body& body : r.bodies)
     text += fmt::format("  - {{mass_kg: {}, moment_kg_m: [{}, {}, {}]}}\n", body.mass,
                         body.moment.x(), body.moment.y(), body.moment.z());
@@ -26,6 +29,7 @@ MassRecord readMasses(Section s) {
   MassRecord r;
   r.date = readDate(s);
   r.kinematics = s.text("kinematics");
+  if (s.has("deviation")) r.deviation = s.number("deviation", 0.0, 1.0);
   for (Section one : s.list("bodies")) {
     MassRecord::Body body;
     body.mass = one.number("mass_kg", 1e-6, 1e5);
@@ -58,6 +62,17 @@ std::string kinematicsOf(const Payload& payload) {
                           link.offset);
   }
   return fingerprint(text);
+}
+
+double massErrorOf(const MassRecord& record, const RobotModel& robot, const JointVector& q,
+                   double before) {
+  constexpr double kDeviations = 3.0;  // [-]
+  RobotModel points = robot;
+  points.base.I_Bcm_B.setZero();
+  for (Link& link : points.links) link.body.I_Bcm_B.setZero();
+  const double whole = compositeBody(robot, q).I_Bcm_B.trace();
+  const double own = whole > 0.0 ? 1.0 - compositeBody(points, q).I_Bcm_B.trace() / whole : 0.0;
+  return kDeviations * record.deviation + own * before;
 }
 
 Payload withMasses(Payload payload, const MassRecord& record) {

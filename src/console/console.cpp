@@ -17,6 +17,7 @@
 #include "ves/core/coordinates.hpp"
 #include "ves/core/lines.hpp"
 #include "ves/evaluation/evidence.hpp"
+#include "ves/evaluation/identified.hpp"
 #include "ves/realtime/realtime.hpp"
 #include "ves/run/session.hpp"
 #include "ves/series/series.hpp"
@@ -159,13 +160,7 @@ class Console {
   }
 
   void keepCalibration(const state_t& s) {
-    CalibrationRecord record;
-    record.date = std::time(nullptr);
-    record.setup = experiment_.source.calibrated;
-    record.temperature = temperature_;
-    record.bias = Vec6::Map(s.bias);
-    record.deviation = Vec6::Map(s.deviation);
-    record.standard_error = Vec6::Map(s.standard_error);
+    const CalibrationRecord record = calibrationOf(s, experiment_.source.calibrated, temperature_);
     calibration_ = record;
     std::string table = "calibrated  bias          of a sample  standard error [count]\n";
     for (int i = 0; i < 6; ++i)

@@ -50,6 +50,18 @@ MotionRecord longestMotion(const Series& series) {
 
 }  // namespace
 
+CalibrationRecord calibrationOf(const state_t& state, const std::string& setup,
+                                double temperature) {
+  CalibrationRecord out;
+  out.date = std::time(nullptr);
+  out.setup = setup;
+  out.temperature = temperature;
+  out.bias = Vec6::Map(state.bias);
+  out.deviation = Vec6::Map(state.deviation);
+  out.standard_error = Vec6::Map(state.standard_error);
+  return out;
+}
+
 IdentifiedMasses identifiedMasses(const Series& series) {
   IdentifiedMasses out;
   out.rests = staticIntervals(series);
@@ -62,6 +74,7 @@ IdentifiedMasses identifiedMasses(const Series& series) {
       completed(out.combinations, out.estimate.beta, massParameters(setup.robot));
   out.record.date = std::time(nullptr);
   out.record.kinematics = kinematicsOf(series.experiment.controller.payload);
+  out.record.deviation = out.estimate.deviation;
   for (Eigen::Index i = 0; i < full.size(); i += 4)
     out.record.bodies.push_back({full(i), full.segment<3>(i + 1)});
   return out;

@@ -190,14 +190,16 @@ MassEstimate estimateMasses(const StaticSetup& setup, const SeparableCombination
                            .cwiseQuotient(length);
     const VectorXd residual = b - A * x;
     const VectorXd deviation = (d.V * d.s.cwiseInverse().asDiagonal()).rowwise().norm();
-    for (int c = 0; c < 6; ++c) {
-      double squares = 0.0, freedom = 0.0;
-      for (Index i = c; i < rows; i += 6) {
-        squares += residual(i) * residual(i);
-        freedom += 1.0 - d.U.row(i).squaredNorm();
-      }
-      sigma(c) = std::max(kLeast, std::sqrt(squares / std::max(1.0, freedom)));
+    Vec6 squares = Vec6::Zero(), freedom = Vec6::Zero();
+    for (Index i = 0; i < rows; ++i) {
+      squares(i % 6) += residual(i) * residual(i);
+      freedom(i % 6) += 1.0 - d.U.row(i).squaredNorm();
     }
+    // Few looks tell a channel's variance poorly: that of all channels counts as kAlike more.
+    constexpr double kAlike = 6.0;
+    const Vec6 alone = squares.cwiseQuotient(freedom.cwiseMax(1.0)).cwiseMax(kLeast * kLeast);
+    const double all = std::exp(alone.array().log().mean());
+    sigma = ((squares.array() + kAlike * all) / (freedom.array() + kAlike)).sqrt().max(kLeast);
     out.beta = x.head(r);
     out.standard_deviation = deviation.cwiseQuotient(length).head(r);
     out.inflation = deviation.head(r);  // of columns of length one
@@ -205,6 +207,11 @@ MassEstimate estimateMasses(const StaticSetup& setup, const SeparableCombination
     out.bias_drift = x.segment<6>(r + 6) / span;
     out.residual = sigma;
     out.condition = d.s(0) / d.s(unknowns - 1);
+    // What the masses explain of the readings, weighed, and its deviation.
+    const MatrixXd spread = d.V.topRows(r) * d.s.cwiseInverse().asDiagonal();
+    const MatrixXd weight_of = scaled.leftCols(r);  // columns of length one
+    out.deviation =
+        (weight_of * spread).norm() / (weight_of * x.head(r).cwiseProduct(length.head(r))).norm();
   }
   return out;
 }

@@ -118,14 +118,14 @@ class Planner {
 
   /// The sensor bears the weight all the way.
   bool borne(const Stand& from, const Stand& to) const {
-    constexpr double kMost = 0.8 * 32768.0;  // [count]
+    const double most = options_.most_range * 32768.0;  // [count]
     constexpr int kLooks = 8;
     for (int i = 1; i <= kLooks; ++i) {
       const double s = static_cast<double>(i) / kLooks;
       const Vec6 counts =
           countRegressor(setup_, from.q + s * (to.q - from.q), from.rpy + s * (to.rpy - from.rpy)) *
           masses_;
-      if (!(counts.cwiseAbs().maxCoeff() < kMost)) return false;
+      if (!(counts.cwiseAbs().maxCoeff() < most)) return false;
     }
     return true;
   }

@@ -55,6 +55,14 @@ class Programs : public testing::Test {
   }
   Output run(const std::string& arguments) { return sh(app("run") + arguments); }
   std::string out(const std::string& name) { return " --out " + (folder_ / name).string() + " "; }
+  std::string file(const std::string& name) const { return (folder_ / name).string(); }
+  /// Status 2, and one line with this in it.
+  static void expectRefusal(const std::string& command, const std::string& in_line) {
+    const Output refused = sh(command);
+    EXPECT_EQ(refused.status, 2) << command;
+    EXPECT_EQ(std::count(refused.text.begin(), refused.text.end(), '\n'), 1) << refused.text;
+    EXPECT_NE(refused.text.find(in_line), std::string::npos) << refused.text;
+  }
 
   static nlohmann::json summary(const fs::path& folder) {
     std::ifstream in(folder / "summary.json");

@@ -102,13 +102,19 @@ struct Experiment {
   Provenance source;
 };
 
-/// Reads a scenario file; `overrides` are "key.path=value"; `calibration`, `masses` and `servo` are
-/// files that a calibration and identifications have left, or empty. Throws InputError.
+/// What a machine has been found to be: the sections of a scenario that a belief file holds.
+inline constexpr std::array<const char*, 3> kBeliefKeys{"calibration", "masses", "servo"};
+
+/// Files that calibrations, identifications and commissionings have left; empty: none.
+struct BeliefFiles {
+  std::filesystem::path calibration = {}, masses = {}, servo = {};  // one section each
+  std::filesystem::path belief = {};  // any of them; a file of one alone goes before
+};
+
+/// Reads a scenario file; `overrides` are "key.path=value". Throws InputError.
 Experiment loadExperiment(const std::filesystem::path& file,
                           const std::vector<std::string>& overrides = {},
-                          const std::filesystem::path& calibration = {},
-                          const std::filesystem::path& masses = {},
-                          const std::filesystem::path& servo = {});
+                          const BeliefFiles& files = {});
 
 /// The same from a document that is in memory.
 Experiment buildExperiment(Value document, const std::vector<std::string>& overrides = {});

@@ -21,6 +21,7 @@ struct MassRecord {
     Vec3 moment = Vec3::Zero();  // [kg m] about the origin of its frame
   };
   std::vector<Body> bodies;  // link 0, with all plates, then the links behind the joints
+  double deviation = 0.0;    // [-] standard, of the weight's wrench; 0: nobody has said
 };
 
 /// YAML, as readMasses() takes it; `comment` on top, its lines without #.
@@ -31,6 +32,11 @@ MassRecord readMasses(Section section);
 
 /// What a record depends on: where the sensor, the robot's base and its joints are.
 std::string kinematicsOf(const Payload& payload);
+
+/// [-] by which the robot's inertia at q may be wrong: three of the record's deviations, and of the
+/// share that is the links' own, which rest tells nothing of, what was `before`.
+double massErrorOf(const MassRecord& record, const RobotModel& robot, const JointVector& q,
+                   double before);
 
 /// The payload with these masses. As many bodies as it has links.
 Payload withMasses(Payload payload, const MassRecord& record);

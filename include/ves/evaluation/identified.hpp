@@ -4,6 +4,7 @@
 // of its force sensor, each as the record that a controller takes.
 #pragma once
 
+#include "ves/config/calibration.hpp"
 #include "ves/config/masses.hpp"
 #include "ves/config/servo.hpp"
 #include "ves/identification/mass_parameters.hpp"
@@ -12,6 +13,9 @@
 #include "ves/series/series.hpp"
 
 namespace ves {
+
+/// A calibration that has just been made; `setup` as Provenance::calibrated.
+CalibrationRecord calibrationOf(const state_t& state, const std::string& setup, double temperature);
 
 struct IdentifiedMasses {
   SeparableCombinations combinations;

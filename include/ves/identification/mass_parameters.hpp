@@ -53,6 +53,7 @@ struct MassEstimate {
   Vec6 bias_drift = Vec6::Zero();  // [count/s]
   Vec6 residual = Vec6::Zero();    // [count] rms of a channel, degrees of freedom allowed for
   double condition = 0.0;          // [-] of the scaled regressor
+  double deviation = 0.0;          // [-] standard, of the weight's readings, as a share of them
   static constexpr double kMixed = 10.0;
 };
 

@@ -38,6 +38,7 @@ struct PosePlanOptions {
   double tilt = 20 * kDegree;      // [rad] most, about x and about y
   double speed = 30.0;             // [deg/s | cm/s] of the joints, mean of a move
   double most_seconds = HUGE_VAL;  // [s] a plan that takes longer is worse
+  double most_range = 0.8;         // [-] of the sensor's, by the masses in the setup
   int exchanges = 3000;            // [-] tried
   std::uint32_t seed = 1;
 };
