@@ -13,7 +13,9 @@
 #include "support/robots.hpp"
 #include "ves/analysis/gate.hpp"
 #include "ves/config/servo.hpp"
+#include "ves/control/gravity_compensation.hpp"
 #include "ves/evaluation/comparison.hpp"
+#include "ves/evaluation/identified.hpp"
 #include "ves/identification/sensor_timing.hpp"
 #include "ves/identification/servo_identification.hpp"
 #include "ves/math/dense.hpp"
@@ -295,6 +297,19 @@ TEST_F(Emulation, MassesThatAreTenPercentOffAreLearnt) {
                    kMean));
           const Series series = run(e);
           EXPECT_TRUE(result_.good()) << e.name;
+          const auto kept = learntMasses(series);
+          EXPECT_EQ(kept.has_value(), learns == std::string("true"));
+          if (kept) {  // what it weighs is known after the run
+            const auto weighs = [&](const Payload& payload) {
+              return staticWrench(payload, e.plant.task.initial_joints, Mat3::Identity(),
+                                  Vec3(0.0, 0.0, -9.81))
+                  .stacked();
+            };
+            const Vec6 truth = weighs(e.plant.payload);
+            EXPECT_LT((weighs(withMasses(e.controller.payload, *kept)) - truth).norm(),
+                      0.3 * (weighs(e.controller.payload) - truth).norm())
+                << configuration << gravity << mass;
+          }
           return share(e, series);
         };
         EXPECT_GT(off("false"), 0.03) << configuration << gravity << mass;
@@ -315,6 +330,13 @@ Experiment takesALoad(const std::string& scenario, const std::string& swing, dou
                         "to_deg_or_m: {2}}}]}}]",
                         swing, to, back, events)},
            kMean));
+}
+
+/// [s] in the run, of a time in its admittance segment.
+double momentOf(const Series& series, double in_segment) {
+  for (const Row& row : series.rows)
+    if (row.state.kind == static_cast<int>(SegmentKind::kAdmittance)) return row.t + in_segment;
+  return HUGE_VAL;
 }
 
 // Nobody tells what it is, only that the gripper moved, somewhat early or late, or in vain.
@@ -338,6 +360,16 @@ TEST_F(Emulation, AnUntoldLoadIsLearntOnceTheGripperIsToldToHaveMoved) {
       const Series series = run(e);
       ASSERT_TRUE(result_.good());
       EXPECT_LT(share(e, series), is_doss ? doss : puma) << e.name << what;
+      // A second later the state tells the mass, and what it may be off by.
+      const state_t& last = series.rows.back().state;
+      const std::size_t hand = learntBodies(e).size() - 1;
+      const double mass = what == std::string("in vain") ? 0.0 : 3.0;  // [kg]
+      for (const Row& row : series.rows) {
+        if (row.t < momentOf(series, 7.25) || row.state.phase != static_cast<int>(Phase::kRunning))
+          continue;
+        ASSERT_NEAR(row.state.learnt_mass[hand], mass, 0.1) << e.name << what << row.t;
+      }
+      EXPECT_LT(last.learnt_mass_deviation[hand], 0.02) << e.name << what;
       // Nothing stays open: the last seconds have no force.
       int withheld = 0, of = 0;
       for (const Row& row : series.rows) {

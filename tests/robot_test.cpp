@@ -142,6 +142,48 @@ TEST_P(MovingBase, MassColumnsAreWhatARobotOfOtherMassesDiffersBy) {
   }
 }
 
+// In kg and kg m, and what these are off by: as the robot with those parameters has them.
+TEST_P(MovingBase, LearntMassesAreThoseOfTheRobotThatIsReckonedWith) {
+  const std::string name = GetParam();
+  const RobotModel robot = name == "skew" ? skewRobot() : test::robot(name).model;
+  const MassRegressor regressor(robot, {robot.size - 1, Vec3(0.1, -0.05, 0.2)});
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> some(-0.2, 0.2);
+  const auto draw = [&] { return some(random); };
+  const Eigen::Index n = regressor.size();
+  const MassVector by = MassVector::NullaryExpr(n, draw);
+  const MassCovariance half = MassCovariance::NullaryExpr(n, n, draw);
+  const MassCovariance P = half * half.transpose();
+  const BodyMasses told = regressor.described(by, P);
+  const auto own = [](const RigidBody& body) {
+    return (Eigen::Vector4d() << body.mass, body.mass * body.p_BoBcm_B).finished();
+  };
+  MassVector without_hand = by;
+  without_hand.tail<4>().setZero();
+  const auto bodies = regressor.links();
+  ASSERT_EQ(static_cast<Eigen::Index>(4 * bodies.size()), n);
+  for (std::size_t k = 0; k + 1 < bodies.size(); ++k) {
+    const auto at = static_cast<Eigen::Index>(k);
+    const Eigen::Vector4d truth = own(regressor.changed(without_hand).bodyOf(bodies[k]));
+    EXPECT_NEAR(told.mass(at), truth(0), 1e-12 * truth(0));
+    EXPECT_LT((told.moment.segment<3>(3 * at) - truth.tail<3>()).norm(), 1e-10);
+    Eigen::MatrixXd J(4, n);  // linear: a difference is exact
+    for (Eigen::Index j = 0; j < n; ++j) {
+      MassVector more = without_hand;
+      if (j < n - 4) more(j) += 1.0;
+      J.col(j) = own(regressor.changed(more).bodyOf(bodies[k])) - truth;
+    }
+    const Eigen::VectorXd deviation = (J * P * J.transpose()).diagonal().cwiseSqrt();
+    EXPECT_NEAR(told.mass_deviation(at), deviation(0), 1e-9 * deviation(0));
+    EXPECT_LT((told.moment_deviation.segment<3>(3 * at) - deviation.tail<3>()).norm(), 1e-9);
+  }
+  const Eigen::Index hand = n / 4 - 1;
+  EXPECT_EQ(told.mass(hand), by(n - 4));  // 1 kg a unit, and nothing to begin with
+  EXPECT_EQ(Vec3(told.moment.segment<3>(3 * hand)), Vec3(by.tail<3>()));
+  EXPECT_DOUBLE_EQ(told.mass_deviation(hand), std::sqrt(P(n - 4, n - 4)));
+  for (Eigen::Index k = hand + 1; k < kMaxUncertain; ++k) EXPECT_EQ(told.mass(k), 0.0);
+}
+
 TEST_P(MovingBase, GravityIsAnUpwardAcceleration) {
   const std::string name = GetParam();
   const RobotModel robot = name == "skew" ? skewRobot() : test::robot(name).model;

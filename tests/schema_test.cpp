@@ -221,6 +221,13 @@ TEST(Schema, EveryFieldComesOutOfALog) {
   EXPECT_EQ(numbersOf(*state), numbersOf(filled<TickState>()));
 }
 
+/// With a mass in link 0, so that there are as many uncertain bodies as a state has room for.
+Experiment ninebodied(Experiment e) {
+  for (RobotModel* robot : {&e.controller.payload.robot, &e.plant.payload.robot})
+    robot->base = {20.0, Vec3(0.01, 0.02, 0.1), Mat3::Identity()};
+  return e;
+}
+
 /// Runs in which everything happens that a state can tell.
 std::set<std::string> everTold() {
   const Numbers before = numbersOf(TickState());
@@ -260,6 +267,15 @@ std::set<std::string> everTold() {
         s.adc[2] = std::min(s.adc[2] + 8 * static_cast<int>(s.sequence - 600), 20'000);
     };
     order(pushed, Request::kStart, 1500);
+  }
+  {  // masses and what is in hand, of as many bodies as there may be
+    std::vector<std::string> set = test::kCompensated;
+    set.insert(set.end(), {"controller.compensation.wrench=aided",
+                           "controller.compensation.learns_masses=true", "sensor.noise=false"});
+    const Experiment e = ninebodied(test::experiment("srms_capture_doss", set));
+    Lockstep loop(e.controller, e.plant);
+    order(loop, Request::kStart, 600);
+    order(loop, Request::kGripper, 200);
   }
   {  // as published, where the energy that is put in has to be paid
     Lockstep loop = loopOf("srms_low_hover_puma",
@@ -320,8 +336,9 @@ std::vector<std::string> cells(const std::string& line) {
 }
 
 TEST(Schema, EveryFieldHasItsColumnsWithTheirUnits) {
-  Experiment e = test::experiment("z_sine");
-  e.controller.compensation.aided = e.controller.compensation.adaptation = true;
+  Experiment e = ninebodied(test::experiment("srms_capture_doss"));
+  Compensation& compensation = e.controller.compensation;
+  compensation.aided = compensation.adaptation = compensation.learns_masses = true;
   Row row;
   row.state = toMessage(filled<TickState>(), header({1, 2}, 3, 4));
   const std::vector<Column> all = columns(e);
@@ -351,6 +368,9 @@ TEST(Schema, EveryFieldHasItsColumnsWithTheirUnits) {
   EXPECT_EQ(number("beta_measured_rad"), s.measured.rpy.y());
   EXPECT_EQ(number("leg6_measured_m"), s.L_measured(5));
   EXPECT_EQ(number("leg2_gain_extend_per_s"), s.servo.extend(1));
+  EXPECT_EQ(number("link_0_learnt_mass_kg"), s.learnt.mass(0));
+  EXPECT_EQ(number("hand_learnt_mass_deviation_kg"), s.learnt.mass_deviation(8));
+  EXPECT_EQ(number("link_2_y_learnt_moment_kgm"), s.learnt.moment(7));
   EXPECT_EQ(number("fy_bias_count"), s.bias(1));
   EXPECT_EQ(number("leg3_rest_count"), s.command.rest[2]);
   EXPECT_EQ(number("energy_paid_j"), s.energy_paid);

@@ -155,6 +155,7 @@ const TickState& TestPlatform::report(const TickInput& in, const Wrenches& W) no
   state_.inertial = W.inertial;
   state_.reaction = aided_.reaction();
   state_.withholds = aided_.withholds();
+  if (aided_.learnsMasses()) state_.learnt = aided_.masses();
   state_.dynamic = W.dynamic;
   state_.compensation_share = share_.value();
   state_.motion = motion_.motion();

@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <ctime>
+#include <span>
 #include <stdexcept>
 #include <utility>
 
 #include "ves/evaluation/static_intervals.hpp"
 #include "ves/identification/scenario.hpp"
+#include "ves/robot/mass_regressor.hpp"
 
 namespace ves {
 namespace {
@@ -77,6 +79,31 @@ IdentifiedMasses identifiedMasses(const Series& series) {
   out.record.deviation = out.estimate.deviation;
   for (Eigen::Index i = 0; i < full.size(); i += 4)
     out.record.bodies.push_back({full(i), full.segment<3>(i + 1)});
+  return out;
+}
+
+std::optional<MassRecord> learntMasses(const Series& series) {
+  const ControllerConfig& c = series.experiment.controller;
+  const MassRegressor regressor(c.payload.robot, c.hand);
+  const std::span<const int> links = regressor.links();
+  if (!c.compensation.learns_masses || series.rows.empty()) return {};
+  const state_t& last = series.rows.back().state;
+  if (!(last.learnt_mass[0] > 0.0)) return {};
+  MassRecord out;
+  out.date = std::time(nullptr);
+  out.kinematics = kinematicsOf(c.payload);
+  const RobotModel believed = carried(c.payload);  // with the plates in link 0
+  for (int i = -1; i < believed.size; ++i) {
+    const RigidBody& body = believed.bodyOf(i);
+    out.bodies.push_back({body.mass, body.mass * body.p_BoBcm_B});
+  }
+  for (std::size_t k = 0; k < links.size(); ++k) {
+    if (static_cast<int>(4 * k) == regressor.hand()) continue;
+    const RigidBody& before = c.payload.robot.bodyOf(links[k]);
+    MassRecord::Body& body = out.bodies[static_cast<std::size_t>(links[k] + 1)];
+    body.mass += last.learnt_mass[k] - before.mass;
+    body.moment += Vec3::Map(last.learnt_moment + 3 * k) - before.mass * before.p_BoBcm_B;
+  }
   return out;
 }
 

@@ -302,6 +302,32 @@ std::vector<std::filesystem::path> drawPlots(const Series& series,
     finish("servos.png", page);
   }
 
+  if (experiment.controller.compensation.learns_masses) {
+    const std::vector<LearntBody> bodies = learntBodies(experiment);
+    Page page(series, marks, "masses.png", experiment.name + ": what is learnt of the masses",
+              program, 1, 2);
+    std::vector<Curve> links, hand;
+    for (std::size_t k = 0; k < bodies.size(); ++k) {
+      const auto& [name, believed] = bodies[k];
+      const auto mass = column(name + "_learnt_mass_kg"),
+                 deviation = column(name + "_learnt_mass_deviation_kg");
+      if (name == "hand") {
+        hand = {{mass, "in hand", kColour[0], false}};
+        for (const double sign : {-1.0, 1.0})
+          hand.push_back({[=](const Row& row) { return mass(row) + sign * deviation(row); },
+                          sign < 0.0 ? "a deviation off" : "", kColour[1], true});
+      } else {
+        links.push_back({[mass, off = believed](const Row& row) {
+                           return mass(row) > 0.0 ? mass(row) - off : NAN;  // learnt yet
+                         },
+                         name.substr(name.find('_') + 1), kColour[k % 3], k >= 3});
+      }
+    }
+    page.panel("masses of links beyond belief [kg]", links);
+    if (!hand.empty()) page.panel("mass in hand [kg]", hand);
+    finish("masses.png", page);
+  }
+
   if (tool && !tool->tick.empty()) {
     Page page(series, marks, "tool.png", experiment.name + ": the tool, carried by the base",
               program, 1, 2);

@@ -8,9 +8,11 @@
 
 #include <cerrno>
 #include <cstring>
+#include <fstream>
 
 #include "ves/core/lines.hpp"
 #include "ves/evaluation/contact_pairs.hpp"
+#include "ves/evaluation/identified.hpp"
 #include "ves/evaluation/summary.hpp"
 #include "ves/evaluation/tool_motion.hpp"
 #include "ves/pictures/plots.hpp"
@@ -65,6 +67,11 @@ std::string writeResults(const std::filesystem::path& folder, const RunResult& r
   if (series.experiment.plant.task.world) {
     writeContacts(contactPairs(series, e), (folder / "contacts.csv").string());
     files += ", contacts.csv";
+  }
+  if (const auto masses = learntMasses(series)) {
+    std::ofstream(folder / "masses.yaml") << write(
+        *masses, "Masses that a run of " + series.experiment.name + " has learnt. For --masses.");
+    files += ", masses.yaml";
   }
   if (plots)
     for (const std::filesystem::path& plot : drawPlots(series, e, tool, folder))

@@ -2,6 +2,7 @@
 #include "ves/robot/mass_regressor.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace ves {
 namespace {
@@ -108,6 +109,26 @@ void MassRegressor::evaluate(const Transform& X_PL0, const Vec3& g_I, const Stat
       set(weight, m.mass * g, m.s.cross(g));
     }
   }
+}
+
+BodyMasses MassRegressor::described(const MassVector& parameters,
+                                    const MassCovariance& P) const noexcept {
+  BodyMasses out;
+  for (int i = 0; i < count_; ++i) {
+    const RigidBody& body = body_[static_cast<std::size_t>(i)];
+    const bool in_hand = 4 * i == hand_;  // nobody told of it: only what was found is there
+    const Eigen::Vector4d found = parameters.segment<4>(4 * i);
+    const Eigen::Matrix4d of = P.block<4, 4>(4 * i, 4 * i);
+    const Vec3 c = in_hand ? Vec3(Vec3::Zero()) : body.p_BoBcm_B;
+    out.mass(i) = body.mass * ((in_hand ? 0.0 : 1.0) + found(0));
+    out.mass_deviation(i) = body.mass * std::sqrt(std::max(0.0, of(0, 0)));
+    for (int k = 0; k < 3; ++k) {
+      const double variance = c(k) * c(k) * of(0, 0) + 2.0 * c(k) * of(0, k + 1) + of(k + 1, k + 1);
+      out.moment(3 * i + k) = out.mass(i) * c(k) + body.mass * found(k + 1);
+      out.moment_deviation(3 * i + k) = body.mass * std::sqrt(std::max(0.0, variance));
+    }
+  }
+  return out;
 }
 
 RobotModel MassRegressor::changed(const MassVector& parameters) const noexcept {

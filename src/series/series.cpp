@@ -144,6 +144,16 @@ RecordedRun recordLockstep(const Experiment& experiment) {
   return out;
 }
 
+std::vector<LearntBody> learntBodies(const Experiment& experiment) {
+  const ControllerConfig& c = experiment.controller;
+  const MassRegressor regressor(c.payload.robot, c.hand);
+  std::vector<LearntBody> out;
+  for (const int link : regressor.links())
+    out.push_back({fmt::format("link_{}", link + 1), c.payload.robot.bodyOf(link).mass});
+  if (regressor.hand() >= 0) out.back() = {"hand", 0.0};
+  return out;
+}
+
 namespace {
 
 /// "m/s^2" as names of columns end: "m_per_s2".
@@ -162,7 +172,8 @@ std::string ending(std::string_view unit) {
 }
 
 /// What a value of a list is called, and its unit: "x", "m" of "m, rad".
-std::pair<std::string, std::string> part(schema::Along along, std::string_view unit, int i) {
+std::pair<std::string, std::string> part(schema::Along along, std::string_view unit, int i,
+                                         const std::vector<LearntBody>& bodies) {
   const std::size_t comma = unit.find(", ");
   const std::string_view own = comma == std::string_view::npos ? unit
                                : i < 3                         ? unit.substr(0, comma)
@@ -172,6 +183,10 @@ std::pair<std::string, std::string> part(schema::Along along, std::string_view u
     case kCoordinates: return {std::string(coordinate(i).name), ending(own)};
     case kWrench:
     case kChannels: return {std::string(wrenchComponent(i).name), ending(own)};
+    case kBodies: return {bodies[static_cast<std::size_t>(i)].name, ending(unit)};
+    case kBodyAxes:
+      return {fmt::format("{}_{}", bodies[static_cast<std::size_t>(i / 3)].name, "xyz"[i % 3]),
+              ending(unit)};
     default: return {fmt::format("leg{}", i + 1), ending(own)};
   }
 }
@@ -183,8 +198,12 @@ void addState(const Experiment& e, std::vector<Column>& out) {
     if (!e.controller.compensation.aided) h.insert("reaction");
     if (!e.controller.compensation.adaptation)
       h.insert({"gain_extend", "gain_retract", "servo_delay"});
+    if (!e.controller.compensation.learns_masses)
+      h.insert(
+          {"learnt_mass", "learnt_mass_deviation", "learnt_moment", "learnt_moment_deviation"});
     return h;
   }();
+  const std::vector<LearntBody> bodies = learntBodies(e);
   const TickState described{};
   const state_t prototype{};
   forEachPair(described, prototype, [&](const auto& field, const auto& in_message) {
@@ -197,8 +216,13 @@ void addState(const Experiment& e, std::vector<Column>& out) {
     };
     if constexpr (std::is_array_v<M>) {
       if (hidden.contains(field.name)) return;
-      for (int i = 0; i < static_cast<int>(std::extent_v<M>); ++i) {
-        const auto [name, unit] = part(field.along, field.unit, i);
+      const bool of_bodies = field.along == schema::Along::kBodies;
+      const int size = of_bodies ? static_cast<int>(bodies.size())
+                       : field.along == schema::Along::kBodyAxes
+                           ? 3 * static_cast<int>(bodies.size())
+                           : static_cast<int>(std::extent_v<M>);
+      for (int i = 0; i < size; ++i) {
+        const auto [name, unit] = part(field.along, field.unit, i, bodies);
         out.push_back({fmt::format("{}_{}_{}", name, field.column, unit),
                        [=](const Row& r) { return static_cast<double>(read(r)[i]); },
                        field.meaning,

@@ -20,7 +20,17 @@
 namespace ves::schema {
 
 /// What the values of a list are named after. `unit` of coordinates and wrenches is two units.
-enum class Along { kOne, kCoordinates, kWrench, kChannels, kLegs, kJoints, kNumbers };
+enum class Along {
+  kOne,
+  kCoordinates,
+  kWrench,
+  kChannels,
+  kLegs,
+  kJoints,
+  kBodies,
+  kBodyAxes,
+  kNumbers
+};
 
 template <typename T>
 struct Field {
@@ -213,6 +223,16 @@ constexpr auto fields(S& s) {
             kWrench, "reaction"},
       Field{"withholds", "-", s.withholds,
             "1: what differs from that is withheld as noise, dynamic is reaction"},
+      Field{"learnt_mass", "kg", s.learnt.mass,
+            "of the heaviest bodies and of what is in hand, in use; 0 unless masses are learnt",
+            kBodies, "learnt_mass"},
+      Field{"learnt_mass_deviation", "kg", s.learnt.mass_deviation, "of that, standard", kBodies,
+            "learnt_mass_deviation"},
+      Field{"learnt_moment", "kg m", s.learnt.moment,
+            "first moment x y z of each about its link's origin, of the last about the hand",
+            kBodyAxes, "learnt_moment"},
+      Field{"learnt_moment_deviation", "kg m", s.learnt.moment_deviation, "of that, standard",
+            kBodyAxes, "learnt_moment_deviation"},
       Field{"dynamic", "N, N m", s.dynamic,
             "total - static_wrench + inertial, behind dead band and low-pass: input of the "
             "admittance model",
@@ -282,7 +302,7 @@ constexpr auto fields(S& s) {
 }
 
 static_assert(members<Sample>() == 15 && members<LegCommand>() == 7 &&
-                  members<MachineSetup>() == 17 && members<TickState>() == 51 &&
+                  members<MachineSetup>() == 17 && members<TickState>() == 52 &&
                   members<Order>() == 6 && members<VehicleOrder>() == 2 &&
                   members<VehicleFactors>() == 3 && members<VehicleVerdict>() == 2 &&
                   members<Segment>() == 5 && members<Trajectory>() == 4,

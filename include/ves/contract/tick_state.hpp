@@ -11,6 +11,7 @@
 #include "ves/contract/order.hpp"
 #include "ves/contract/sample.hpp"
 #include "ves/math/quintic.hpp"
+#include "ves/robot/mass_regressor.hpp"
 
 namespace ves {
 
@@ -68,6 +69,7 @@ struct TickState {
   std::int32_t age = 0;
   Wrench total, static_wrench, inertial, reaction;  // F_Po_I
   bool withholds = false;
+  BodyMasses learnt;
   Wrench dynamic;  // F_Po_I
   PathPoint<6> motion;
   Vec6 desired = Vec6::Zero();

@@ -76,6 +76,9 @@ class AidedWrench {
   bool withholds() const noexcept { return withholds_; }         // the residual
   const ResidualNoise& noise() const noexcept { return noise_; }
   const MassBelief& belief() const noexcept { return belief_; }
+  /// What the model has, and how well it is known.
+  BodyMasses masses() const noexcept { return regressor_.described(used_, belief_.covariance()); }
+  bool learnsMasses() const noexcept { return begun_ && prior_.size() > 0; }
   /// Of this tick.
   const Lesson& lesson() const noexcept { return lesson_; }
   /// The robot to reckon with from the next tick on, where this one taught another.

@@ -32,6 +32,7 @@ class MassBelief {
   }
 
   auto parameters() const noexcept { return x_.head(size()); }
+  auto covariance() const noexcept { return P_.topLeftCorner(size(), size()); }
   Vec6 bias() const noexcept { return x_.segment<6>(size()); }  // [count] beyond what is taken out
 
   /// Four parameters from `first` on may have changed, by so much.

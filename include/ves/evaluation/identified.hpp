@@ -28,6 +28,10 @@ struct IdentifiedMasses {
 /// do not tell.
 IdentifiedMasses identifiedMasses(const Series& series);
 
+/// The robot as a run has learnt it (learns_masses), without what was in its hand; none where no
+/// mass was learnt.
+std::optional<MassRecord> learntMasses(const Series& series);
+
 struct IdentifiedServo {
   ServoEstimate legs;
   std::optional<SensorEstimate> sensor;

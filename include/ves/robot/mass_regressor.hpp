@@ -4,6 +4,8 @@
 // be: linear in four parameters a body, to first order.
 #pragma once
 
+#include <span>
+
 #include "ves/robot/robot_model.hpp"
 
 namespace ves {
@@ -16,6 +18,17 @@ inline constexpr int kMaxMassParameters = 4 * kMaxUncertain;
 using MassVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxMassParameters, 1>;
 /// One column a parameter.
 using MassColumns = Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, kMaxMassParameters>;
+using MassCovariance = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxMassParameters,
+                                     kMaxMassParameters>;
+
+/// Bodies whose masses may be wrong, in their own units. Zero behind the last.
+struct BodyMasses {
+  using PerBody = Eigen::Matrix<double, kMaxUncertain, 1>;
+  using PerAxis = Eigen::Matrix<double, 3 * kMaxUncertain, 1>;           // x, y, z of each body
+  PerBody mass = PerBody::Zero(), mass_deviation = PerBody::Zero();      // [kg]
+  PerAxis moment = PerAxis::Zero(), moment_deviation = PerAxis::Zero();  // [kg m] first, about the
+                                                                         // link's origin
+};
 
 /// The last four parameters are those of a body in the hand that nobody told of: of 1 kg and at the
 /// hand, so its mass [kg] and its first moment about there [kg m].
@@ -39,6 +52,14 @@ class MassRegressor {
   /// link, g_I [m/s^2].
   void evaluate(const Transform& X_PL0, const Vec3& g_I, const State& at, MassColumns& momentum,
                 MassColumns& weight) const noexcept;
+
+  /// The bodies with these parameters, known with this covariance.
+  BodyMasses described(const MassVector& parameters, const MassCovariance& P) const noexcept;
+  /// [-] of each body in BodyMasses: the link that it is or hangs on, -1: link 0. So many as there
+  /// are; what is in the hand, if anything may be, is the last.
+  std::span<const int> links() const noexcept {
+    return {links_.data(), static_cast<std::size_t>(count_)};
+  }
 
   /// The robot with these parameters.
   RobotModel changed(const MassVector& parameters) const noexcept;

@@ -73,6 +73,9 @@ struct RobotModel {
   const Link& link(int i) const { return links[static_cast<std::size_t>(i)]; }
   /// Of a link that moves, or of link 0 (-1).
   RigidBody& bodyOf(int i) { return i < 0 ? base : links[static_cast<std::size_t>(i)].body; }
+  const RigidBody& bodyOf(int i) const {
+    return i < 0 ? base : links[static_cast<std::size_t>(i)].body;
+  }
   const Link& jointLink(int i) const { return link(own[static_cast<std::size_t>(i)]); }
   /// A further link. It has a joint of its own, or follows the one it names.
   void add(const Link& link, bool follows = false);

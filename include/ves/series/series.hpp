@@ -72,6 +72,14 @@ Transform toolPose(const Experiment& experiment, const Vec6& x, const JointVecto
 /// [m] of x, y, z, or [rad] of the fixed angles.
 double coordinateOf(const Transform& X_IT, int i);
 
+/// A body whose mass is learnt.
+struct LearntBody {
+  std::string name;       // "link_0", ..., "hand"
+  double believed = 0.0;  // [kg]
+};
+/// In the order of BodyMasses.
+std::vector<LearntBody> learntBodies(const Experiment& experiment);
+
 /// Whether a push lasts.
 bool pushed(const truth_t& truth) noexcept;
 
