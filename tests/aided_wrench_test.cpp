@@ -203,6 +203,40 @@ TEST(JointMomentum, AnglesThatAreOlderBeginAnew) {
 
 // The gate
 
+// Means of the simulated sensor's readings scatter as the filter's model foretells.
+TEST(SensorNoise, BehindAFilterIsCorrelatedAsTheFilterSays) {
+  for (const int readings : {1, 4}) {
+    const Experiment e = test::experiment("puma_on_table_4_1",
+                                          {fmt::format("sensor.readings_per_tick={}", readings)});
+    plant::ForceTorqueSensor sensor(e.plant.sensor, plant::Noise(3));
+    const double period = e.controller.periodSeconds();
+    constexpr int kSteps = 20;  // [-] of a period
+    const auto step = sensor.prepare(period / kSteps);
+    const Vec6 bias = e.plant.sensor.bias / e.plant.sensor.volts_per_count;
+    sensor.settle({});
+    constexpr int kMeans = 4000, kSamples = 50;
+    double once = 0.0, of_means = 0.0;  // [count^2]
+    for (int k = 0; k < kMeans; ++k) {
+      Vec6 mean = Vec6::Zero();
+      for (int i = 0; i < kSamples; ++i) {
+        Vec6 sample = Vec6::Zero();
+        for (int r = 0; r < readings; ++r) {
+          for (int j = 0; j < kSteps / readings; ++j)
+            sensor.advance(step, {}, plant::ForceTorqueSensor::Over::kConstant);
+          const AdcCounts adc = sensor.convert(0.0);
+          for (int c = 0; c < kWrenchChannels; ++c)
+            sample(c) += (adc[static_cast<std::size_t>(c)] - bias(c)) / readings;
+        }
+        once += sample.squaredNorm() / kSamples / kMeans;
+        mean += sample / kSamples;
+      }
+      of_means += mean.squaredNorm() / kMeans;
+    }
+    const double foretold = filteredCorrelation(e.controller.servo, period);
+    EXPECT_NEAR(kSamples * of_means / once, foretold, 0.06 * foretold) << readings;
+  }
+}
+
 /// [count] deviations of 5, the mean of a calibration independent samples' mean.
 ResidualNoise noiseOfFive() {
   ResidualNoise n;

@@ -90,6 +90,7 @@ AidedWrench::AidedWrench(const ControllerConfig& config)
       prior_(regressor_.deviations(common_)),
       most_(kMostDeviations * prior_),
       bias_deviation_(config.stillness.bias),
+      least_correlation_(filteredCorrelation(config.servo, config.periodSeconds())),
       gate_(config),
       twist_(config.servo.sensor_cutoff),
       doubted_(static_cast<int>(std::lround(kDoubt / config.periodSeconds()))),
@@ -326,6 +327,7 @@ Mat6 AidedWrench::countsPerWrench(const Mat3& R_IP) const noexcept {
 /// A leg whose length is taken wrongly turns the weight; one whose acceleration is, the inertia.
 void AidedWrench::refreshNoise(const Input& in) noexcept {
   noise_.sensor = in.bias.noise();
+  noise_.sensor.correlation = std::max(noise_.sensor.correlation, least_correlation_);
   noise_.weight.setZero();
   noise_.legs.setZero();
   const Mat6& M_1 = in.robot.M_1();

@@ -67,6 +67,27 @@ Mat6 wrenchNoise(const ForceSensor& sensor, const SensorNoise& noise, const Mat3
   return J.lazyProduct(right);
 }
 
+double filteredCorrelation(const ServoModel& servo, double period) {
+  if (!(servo.sensor_cutoff > 0.0)) return 1.0;
+  // Autocorrelation behind the filter, of readings a time apart.
+  const double a = servo.sensor_cutoff / M_SQRT2;
+  const auto behind = [&](double apart) {
+    const double x = a * std::abs(apart);
+    return std::exp(-x) * (std::cos(x) + std::sin(x));
+  };
+  const int n = servo.sensor_readings;
+  const auto ofSamples = [&](double apart) {
+    double sum = 0.0;
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j < n; ++j) sum += behind(apart + (i - j) * servo.sensor_window / n);
+    return sum;
+  };
+  constexpr double kForgotten = 20.0;  // [-] times 1/a
+  double all = ofSamples(0.0);
+  for (int k = 1; k * period < kForgotten / a; ++k) all += 2.0 * ofSamples(k * period);
+  return all / ofSamples(0.0);
+}
+
 SensorNoise noiseOf(const ChannelStatistics& statistics) noexcept {
   SensorNoise out;
   out.variance = statistics.deviation().cwiseAbs2();

@@ -123,6 +123,7 @@ class AidedWrench {
   MassVector most_;        // [-, m, kg, kg m] that a parameter may be
   Eigen::Vector4d hand_;   // [kg, kg m] deviations of what is in the hand, where that is not known
   double bias_deviation_;  // [count] before a calibration
+  double least_correlation_;  // [-] of the sensor's noise: a calibration tells it poorly
   ResidualGate gate_;
   ResidualNoise noise_;
   Butterworth2<6> twist_;       // of the platform, as the wrench shows it

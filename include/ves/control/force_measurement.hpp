@@ -5,6 +5,7 @@
 
 #include "ves/contract/tick_state.hpp"
 #include "ves/control/program.hpp"
+#include "ves/control/servo.hpp"
 
 namespace ves {
 
@@ -67,6 +68,9 @@ struct SensorNoise {
   /// [count^2] Of the mean of n samples in a row.
   Vec6 ofMean(int n) const noexcept { return (n > 1 ? correlation / n : 1.0) * variance; }
 };
+/// SensorNoise::correlation of noise that is white ahead of the sensor's filter, samples a period
+/// [s] apart.
+double filteredCorrelation(const ServoModel& servo, double period);
 /// [N^2 | N^2 m | N^2 m^2] Covariance of F_Po_I, a sample's part in a mean over many.
 Mat6 wrenchNoise(const ForceSensor& sensor, const SensorNoise& noise, const Mat3& R_IP) noexcept;
 /// As a calibration found it.
