@@ -52,7 +52,7 @@ constexpr const char* kExamples =
     "ves demo --view                            the main job, in a browser too\n"
     "ves run                                    what scenarios there are\n"
     "ves run srms_capture_doss --lockstep       one of them, as fast as it goes\n"
-    "ves run ramp --set controller.rate_hz=200  with another value; ves keys lists them\n"
+    "ves run ramp --set legs.filters=outputs    with another value; ves keys lists them\n"
     "ves view newest                            the last run in a browser\n"
     "ves view RUN --video run.mp4               as a film\n"
     "ves replay newest --check                  through the controller again, bit for bit\n"

@@ -404,6 +404,12 @@ INSTANTIATE_TEST_SUITE_P(
             "program=[{trajectory: {duration_s: 1}, faults: [{at_s: 0, duration_s: 1, fault: "
             "gremlin}]}]",
             "'gremlin', want one of wrench_frozen"},
+        Bad{"excite_with_events", "puma_tilt",
+            "program=[{excite: {tilt_deg: 4, duration_s: 9}, robot: [{at_s: 0, duration_s: 1, "
+            "joint: joint_1, to_deg_or_m: 1}]}]",
+            "program[0].excite: has events beside it, want it alone"},
+        Bad{"excite_without_angle", "z_sine", "program=[{excite: {duration_s: 9}}]",
+            "program[0].excite.tilt_deg: missing"},
         Bad{"two_kinds", "z_sine", "program=[{move: {}, calibration: {}}]",
             "want only one of them"},
         Bad{"sine_without_frequency", "z_sine",
@@ -577,6 +583,38 @@ TEST(Config, TheOldNameOfPlantMismatchDoesNotApplyTwice) {
             std::string::npos);
   EXPECT_EQ(load({"reality={gain_extend: 0.5}"}).plant.actuator.gain_extend,
             load({"plant_mismatch={gain_extend: 0.5}"}).plant.actuator.gain_extend);
+}
+
+// Tilts there and back about x and y, in equal times, that end at home.
+TEST(Config, AnExcitationIsFiveMoves) {
+  const Experiment e =
+      loadExperiment(test::configDir() + "/scenarios/z_sine.yaml",
+                     {"program=[{calibration: {}}, {excite: {tilt_deg: 4, duration_s: 9}}]"});
+  const Program& program = e.controller.program;
+  ASSERT_EQ(program.size, 6);
+  Vec6 sum = Vec6::Zero(), most = Vec6::Zero();
+  for (std::size_t i = 1; i < 6; ++i) {
+    const Segment& move = program.segments[i];
+    EXPECT_EQ(move.kind, SegmentKind::kMove);
+    EXPECT_NEAR(move.duration, 9.0 / 5.0, 1e-12);
+    sum += move.target.stacked();
+    most = most.cwiseMax(move.target.stacked().cwiseAbs());
+  }
+  EXPECT_TRUE(sum.isZero(0.0));
+  EXPECT_TRUE(most.isApprox((Vec6() << 0, 0, 0, 4, 4, 0).finished() * M_PI / 180.0));
+  EXPECT_TRUE(program.segments[5].target.stacked().isZero(0.0));
+}
+
+// Of more moves than a program holds, none is lost in silence.
+TEST(Config, ExcitationsThatFillAProgramAreRefused) {
+  std::string program;
+  for (int i = 0; i < 13; ++i)
+    program += fmt::format("{}{{excite: {{tilt_deg: 4, duration_s: 9}}}}", i > 0 ? ", " : "");
+  const std::string said = test::refusal([&] {
+    loadExperiment(test::configDir() + "/scenarios/z_sine.yaml",
+                   {fmt::format("program=[{}]", program)});
+  });
+  EXPECT_NE(said.find("has more than 64 segments"), std::string::npos) << said;
 }
 
 TEST(Config, LoadsAreToldInTheOrderOfTheirTimes) {

@@ -69,6 +69,18 @@ void warnOfFullChannels(Experiment& e) {
           100.0 * most(i) / kFullScale, wrenchComponent(i).name, i));
 }
 
+/// Where masses are to be learnt from a wide belief, and nothing tells of them before admittance.
+std::string proposeExcitation(Section& root, const ControllerConfig& c) {
+  constexpr double kWide = 0.02;  // [-]
+  if (!c.compensation.learns_masses || c.compensation.mass_error < kWide) return {};
+  for (Section& item : root.list("program"))
+    if (item.has("excite")) return {};
+  return fmt::format(
+      "masses are learnt from a belief of +-{:.0f} % while the vehicle is emulated; `excite: "
+      "{{tilt_deg: 4, duration_s: 9}}` after the calibration tells most of them before it",
+      100.0 * c.compensation.mass_error);
+}
+
 Experiment build(const Value& document, AskedKey* asked = nullptr) {
   Experiment out;
   Section root(document, "", asked);
@@ -224,6 +236,8 @@ Experiment build(const Value& document, AskedKey* asked = nullptr) {
   }
 
   readProgram(root, out);
+  if (const std::string proposal = proposeExcitation(root, c); !proposal.empty())
+    out.source.notes.push_back(proposal);
   ToldLoads& told = c.told_loads;
   std::stable_sort(
       told.loads.begin(), told.loads.begin() + told.size, [](const ToldLoad& a, const ToldLoad& b) {

@@ -21,24 +21,59 @@ class ProgramReader {
       root.fail("program",
                 fmt::format("has {} segments, want 1 to {}", items.size(), kMaxSegments));
     for (Section item : items) {
-      Segment& segment =
-          out_.controller.program.segments[static_cast<std::size_t>(out_.controller.program.size)];
-      readSegment(item, segment);
+      const std::string kind = item.onlyKey(
+          {"calibration", "move", "trajectory", "admittance", "monitor", "path", "excite"},
+          {"robot", "faults"});
+      if (kind == "excite") {
+        readExcite(root, item);
+        continue;
+      }
+      Segment& segment = next(root);  // which its events belong to
+      readSegment(item.section(kind), kind, segment);
       if (item.has("robot")) readRobotEvents(item);
       if (item.has("faults"))
         for (Section event : item.list("faults")) readFault(event);
       item.finish();
-      robot_.pass(segment);
-      ++out_.controller.program.size;
+      pass(segment);
     }
   }
 
  private:
-  void readSegment(Section& item, Segment& segment) {
-    const std::string kind =
-        item.onlyKey({"calibration", "move", "trajectory", "admittance", "monitor", "path"},
-                     {"robot", "faults"});
-    Section s = item.section(kind);
+  Segment& next(Section& root) {
+    Program& program = out_.controller.program;
+    if (program.size == kMaxSegments)
+      root.fail("program",
+                fmt::format("has more than {} segments, with the moves of excite", kMaxSegments));
+    return program.segments[static_cast<std::size_t>(program.size)];
+  }
+
+  void pass(const Segment& segment) {
+    robot_.pass(segment);
+    ++out_.controller.program.size;
+  }
+
+  /// Tilts about x and y, there and back, which tell the robot's weight from the sensor's bias.
+  void readExcite(Section& root, Section& item) {
+    if (item.has("robot") || item.has("faults"))
+      item.fail("excite", "has events beside it, want it alone: the robot stands still");
+    Section s = item.section("excite");
+    const double tilt = s.number("tilt_deg", 0.1, 45.0) * kDegree,
+                 duration = s.number("duration_s", 2.0, 1e4);
+    s.finish();
+    item.finish();
+    constexpr int kMoves = 5;
+    const Vec3 tilts[kMoves] = {
+        Vec3::UnitX(), -Vec3::UnitX(), Vec3::UnitY(), -Vec3::UnitY(), {0, 0, 0}};
+    for (const Vec3& way : tilts) {
+      Segment& move = next(root);
+      move.kind = SegmentKind::kMove;
+      move.duration = duration / kMoves;
+      move.target = {Vec3::Zero(), tilt * way};
+      pass(move);
+    }
+  }
+
+  void readSegment(Section s, const std::string& kind, Segment& segment) {
     if (kind == "calibration") {
       segment.kind = SegmentKind::kCalibration;
     } else if (kind == "move") {
