@@ -201,6 +201,59 @@ TEST(JointMomentum, AnglesThatAreOlderBeginAnew) {
   }
 }
 
+// A reading that is older than its sample goes on as fast as of late, wherever inertia is
+// compensated.
+TEST(JointMomentum, CarriesReadingsThatAreOldOnToTheirSample) {
+  for (const bool compensated : {false, true}) {
+    ControllerConfig c = pendulum(config());
+    c.compensation.inertia = compensated;
+    KnownPayload known(c);
+    JointMomentum joints(c);
+    Sample s;
+    for (int k = 0; k < 60; ++k) {
+      s.time = s.wrench_time = k * kTick;
+      s.joints_time = (k * kTick) / 13'000'000 * 13'000'000;  // every 13 ms
+      s.q(0) = 0.3 + 0.4e-9 * static_cast<double>(s.joints_time);
+      const double now = 0.3 + 0.4e-9 * static_cast<double>(s.time);
+      if (k > 3) EXPECT_NEAR(joints.at(s)(0), compensated ? now : s.q(0), 1e-12) << k;
+      joints.update(known, s, Mat3::Identity(), 1e-2);
+    }
+    s.joints_time = s.time;  // as old as the sample: the reading
+    EXPECT_EQ(joints.at(s), s.q);
+  }
+}
+
+// Readings that scatter make a momentum that scatters no more than is reckoned with, and no less
+// than a quarter of it.
+TEST(JointMomentum, ScattersAsItsReadingsAreBelievedTo) {
+  constexpr double kScatter = 1e-4;                                  // [rad]
+  for (const std::int64_t interval : {0, 13'000'000, 20'000'000}) {  // [ns]
+    ControllerConfig c = pendulum(config({"sensor.readings_per_tick=4"}));
+    c.joints.interval = 1e-9 * static_cast<double>(interval);
+    c.joints.deviation(0) = kScatter;
+    KnownPayload known(c);
+    JointMomentum joints(c);
+    std::mt19937 random(3);
+    std::normal_distribution<double> scatter(0.0, kScatter);
+    double squares = 0.0, q = 0.0;
+    std::int64_t read = -1;
+    constexpr int kTicks = 5000;
+    for (int k = 0; k < kTicks; ++k) {
+      Sample s;
+      s.time = s.wrench_time = k * kTick;
+      s.joints_time = interval > 0 ? s.time / interval * interval : s.time;
+      if (s.joints_time != read) q = scatter(random);
+      read = s.joints_time;
+      s.q(0) = q;
+      joints.update(known, s, Mat3::Identity(), 1e-2);
+      if (k >= 10) squares += std::pow(joints.q_dot()(0), 2) / (kTicks - 10);
+    }
+    const double foretold = kScatter * JointParabola(c).speed;
+    EXPECT_LT(std::sqrt(squares), foretold) << interval;
+    EXPECT_GT(std::sqrt(squares), foretold / 4.0) << interval;
+  }
+}
+
 // The gate
 
 // Means of the simulated sensor's readings scatter as the filter's model foretells.
@@ -360,7 +413,9 @@ TEST(AidedWrench, KnowsWhatRoundedLegsMakeOfWeightAndInertia) {
   RobotInertia inertia(c);
   inertia.update(KnownPayload(c), 0, q, 0.0, X_IP, standing, true, 1.0);
   joints.reset(q);
-  aided.update({Wrench{}, static_wrench, inertia, joints, samples, bias, X_IP, 1.0, false}, true);
+  aided.update({Wrench{}, static_wrench, carried(c.payload), inertia, joints, samples, bias, X_IP,
+                1.0, false},
+               true);
   EXPECT_LT((aided.noise().weight - weight).norm(), 1e-4 * weight.norm());
   EXPECT_LT((aided.noise().legs - legs.cwiseSqrt()).norm(), 1e-4 * legs.cwiseSqrt().norm());
 }

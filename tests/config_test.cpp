@@ -404,6 +404,11 @@ INSTANTIATE_TEST_SUITE_P(
             "program=[{trajectory: {duration_s: 1}, faults: [{at_s: 0, duration_s: 1, fault: "
             "gremlin}]}]",
             "'gremlin', want one of wrench_frozen"},
+        Bad{"encoders_without_a_joint", "puma_tilt",
+            "robot.encoders={counts_per_turn_or_m: [4096, 4096]}",
+            "robot.encoders.counts_per_turn_or_m: has 2 entries, want 6"},
+        Bad{"encoders_of_few_counts", "puma_tilt", "robot.encoders={counts_per_turn_or_m: 4}",
+            "robot.encoders.counts_per_turn_or_m: "},
         Bad{"excite_with_events", "puma_tilt",
             "program=[{excite: {tilt_deg: 4, duration_s: 9}, robot: [{at_s: 0, duration_s: 1, "
             "joint: joint_1, to_deg_or_m: 1}]}]",

@@ -349,6 +349,53 @@ TEST(Plant, AveragedReadingsAreThoseOfTheMiddlesOfTheWindowsParts) {
   EXPECT_EQ(mean.sample().wrench_time, 50 * 10'000'000 + 4'000'000);
 }
 
+TEST(JointEncoders, RoundToCountsBehindTheirPlay) {
+  plant::JointEncoderModel model;
+  model.count(0) = 0.25;
+  model.play(1) = 0.5;
+  plant::JointEncoders encoders(model, Noise(1), JointVector::Zero());
+  // Joint 2 turns up to 1, and back: its encoder follows by half of the play, then rests for all
+  // of it. Joint 3 has an encoder without fault.
+  for (const auto& [q, rounded, played] :
+       {std::tuple{0.1, 0.0, 0.0}, std::tuple{0.2, 0.25, 0.0}, std::tuple{0.4, 0.5, 0.15},
+        std::tuple{1.0, 1.0, 0.75}, std::tuple{0.8, 0.75, 0.75}, std::tuple{0.5, 0.5, 0.75},
+        std::tuple{0.3, 0.25, 0.55}, std::tuple{-0.1, 0.0, 0.15}}) {
+    const JointVector read = encoders.read(q * JointVector::Ones());
+    EXPECT_DOUBLE_EQ(read(0), rounded) << q;
+    EXPECT_NEAR(read(1), played, 1e-12) << q;
+    EXPECT_EQ(read(2), q);
+  }
+  model = {};
+  model.noise(0) = 1e-3;
+  plant::JointEncoders noisy(model, Noise(1), JointVector::Zero());
+  double squares = 0.0;
+  constexpr int kReadings = 10000;
+  for (int k = 0; k < kReadings; ++k)
+    squares += std::pow(noisy.read(JointVector::Zero())(0), 2) / kReadings;
+  EXPECT_NEAR(std::sqrt(squares), 1e-3, 0.03e-3);
+}
+
+// A sample has the newest reading, and says when that was; the motion is that of exact encoders.
+TEST(Plant, EncodersAreReadAtTheirRate) {
+  const Experiment e = experiment("puma_on_table_4_1", {"robot.encoders={rate_hz: 77}"});
+  EXPECT_NEAR(static_cast<double>(e.plant.joints.interval), 1e9 / 77.0, 0.5);
+  Plant plant(e.plant);
+  EXPECT_TRUE(plant.moveRobot(RobotMove{0, 0.5, 1.0}));
+  JointVector before = e.plant.task.initial_joints;
+  std::int64_t last = 0;
+  for (int k = 1; k <= 90; ++k) {
+    plant.advance(k * 10'000'000LL);
+    const Sample s = plant.sample();
+    EXPECT_EQ(s.joints_time, s.time / e.plant.joints.interval * e.plant.joints.interval) << k;
+    if (s.joints_time == last)
+      EXPECT_EQ(s.q, before);
+    else if (k > 20)
+      EXPECT_NE(s.q, before);
+    before = s.q;
+    last = s.joints_time;
+  }
+}
+
 TEST(Plant, SameSeedSameBytesOtherSeedOthers) {
   const auto run = [](const char* seed) {
     const Experiment e = experiment("puma_on_table_4_1", {seed});

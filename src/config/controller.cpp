@@ -50,6 +50,8 @@ Compensation readCompensation(Section& controller) {
   c.gate = s.number("gate_deviations", 0.0, 100.0);
   c.gate_hold = s.number("gate_hold_s", 0.0, 100.0);
   c.timing_error = s.number("timing_error_s", 0.0, 0.005);
+  if (s.has("joint_jerk_rad_or_m_per_s3"))
+    c.joint_jerk = s.number("joint_jerk_rad_or_m_per_s3", 1e-3, 1e6);
   c.gain_error = s.number("gain_error", 0.0, 0.5);
   c.mass_error = s.number("mass_error", 0.0, 0.5);
   s.finish();

@@ -175,6 +175,16 @@ Experiment build(const Value& document, AskedKey* asked = nullptr) {
     c.payload.X_RL0 = robot.X_RL0;
     c.payload.robot = out.robot.model;
     p.task.initial_joints = robot.q;
+    p.joints = robot.encoders;
+    c.joints.deviation =
+        ((robot.encoders.count.cwiseAbs2() + robot.encoders.play.cwiseAbs2()) / 12.0 +
+         robot.encoders.noise.cwiseAbs2())
+            .cwiseSqrt();
+    // Of joints at rest readings differ by a count, where their noise takes them across.
+    constexpr double kMostNoise = 8.0;  // [-] times its deviation, from reading to reading
+    c.stillness.joint = std::max(
+        c.stillness.joint, (robot.encoders.count + kMostNoise * robot.encoders.noise).maxCoeff());
+    c.joints.interval = static_cast<double>(robot.encoders.interval) * kSecondPerNanosecond;
     out.source.notes = out.robot.warnings;
     if (!out.robot.choice.empty()) out.source.warnings.push_back(out.robot.choice);
   }

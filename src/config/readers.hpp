@@ -68,6 +68,7 @@ struct Robot {
   Transform X_PR, X_RL0;
   RigidBody adapter_R;
   JointVector q = JointVector::Zero();
+  plant::JointEncoderModel encoders;
 };
 Robot readRobot(Section s, const Value& document);
 /// Fails at `key` unless the joint may be at q [rad | m].

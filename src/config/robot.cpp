@@ -113,6 +113,36 @@ JointVector initialJoints(Section& s, const UrdfRobot& robot) {
   return q;
 }
 
+/// A number a joint, or one for all of them; zeros where the key is left out.
+static JointVector ofJoints(Section& s, std::string_view key, int joints, double lo, double hi) {
+  JointVector out = JointVector::Zero();
+  if (!s.has(key)) return out;
+  if (s.isList(key))
+    out.head(joints) = s.vector(key, joints, lo, hi);
+  else
+    out.head(joints).setConstant(s.number(key, lo, hi));
+  return out;
+}
+
+static plant::JointEncoderModel readEncoders(Section s, const RobotModel& robot) {
+  plant::JointEncoderModel out;
+  constexpr const char* kCounts = "counts_per_turn_or_m";
+  const JointVector counts = ofJoints(s, kCounts, robot.joints, 10.0, 1e10);
+  out.play = ofJoints(s, "play_deg_or_m", robot.joints, 0.0, 10.0);
+  out.noise = ofJoints(s, "noise_deg_or_m", robot.joints, 0.0, 10.0);
+  for (int i = 0; i < robot.joints; ++i) {
+    const Link& link = robot.jointLink(i);
+    const double unit = jointUnit(link.type),
+                 turn = link.type == JointType::kPrismatic ? 1.0 : 2.0 * M_PI;
+    if (counts(i) > 0.0) out.count(i) = turn / counts(i);
+    out.play(i) *= unit;
+    out.noise(i) *= unit;
+  }
+  if (s.has("rate_hz")) out.interval = std::llround(1e9 / s.number("rate_hz", 1.0, 1e5));
+  s.finish();
+  return out;
+}
+
 Robot readRobot(Section s, const Value& document) {
   Robot robot;
   const Value* text = document.find("robot")->find("urdf_text");
@@ -124,6 +154,7 @@ Robot readRobot(Section s, const Value& document) {
   robot.X_RL0 = {rotation(s.vector("mount_rpy_deg", 3, -360.0, 360.0) * kDegree),
                  s.vector("mount_m", 3, -10.0, 10.0)};
   robot.q = initialJoints(s, robot.urdf);
+  if (s.has("encoders")) robot.encoders = readEncoders(s.section("encoders"), robot.urdf.model);
   s.finish();
   return robot;
 }

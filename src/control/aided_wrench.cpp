@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "ves/math/dense.hpp"
+#include "ves/robot/momentum.hpp"
 
 namespace ves {
 
@@ -48,11 +49,12 @@ ResidualGate::ResidualGate(const ControllerConfig& config) : deviations_(config.
 
 namespace {
 
-/// [count^2] of the sensor and the attitude in the mean of n samples.
+/// [count^2] of sensor, attitude and joints in the mean of n samples.
 Vec6 variance(int n, const ResidualNoise& noise) {
   // Where no noise dithers them, what a count leaves out stays the same from sample to sample.
   const auto undithered = (-4.0 * M_PI * M_PI * noise.sensor.variance.array()).exp() / 12.0;
-  return noise.sensor.ofMean(n) + undithered.matrix() + noise.weight;
+  return noise.sensor.ofMean(n) + undithered.matrix() + noise.weight +
+         (noise.joints / n).cwiseAbs2();
 }
 
 }  // namespace
@@ -77,9 +79,11 @@ AidedWrench::AidedWrench(const ControllerConfig& config)
                             std::lround(config.compensation.gate_hold / config.periodSeconds())))),
       gravity_(config.gravity),
       geometry_(config.geometry),
+      period_(config.periodSeconds()),
       rounding_(config.servo.readings.scale.maxCoeff() / std::sqrt(12.0)),
       speed_of_count_(config.servo.extend.cwiseMax(config.servo.retract)
                           .cwiseProduct(config.servo.readings.scale)),
+      joint_speed_(JointParabola(config).speed * config.joints.deviation),
       X_SP_(inverse(config.sensor.X_PS)),
       S_proc_(inverse(config.sensor.C_proc)),
       X_PL0_(config.payload.X_PL0()),
@@ -172,7 +176,7 @@ void AidedWrench::restart() noexcept {
   sums_[0].columns.setZero(6, prior_.size());
   sums_[0].y.setZero();
   sums_[0].time = 0.0;
-  belief_.beginBlocks(legsMomentum());
+  belief_.beginBlocks(momentumNoise());
   beliefs_[0] = belief_;
 }
 
@@ -252,8 +256,8 @@ void AidedWrench::endGroup(const Mat6& counts_per_wrench) noexcept {
   const double block_time = sum.time - before.time;
   constexpr double kShare = 1.0 / static_cast<double>(kGroupsOfBlock);
   belief_.learn(kShare * (sum.columns - before.columns), kShare * (sum.y - before.y),
-                variance(static_cast<int>(kGroupsOfBlock) * Lesson::kGroup, noise_), legsMomentum(),
-                block_time);
+                variance(static_cast<int>(kGroupsOfBlock) * Lesson::kGroup, noise_),
+                momentumNoise(), block_time);
   if (doubts_ > 0) belief_.doubt(regressor_.hand(), hand_);
   beliefs_[(block + 1) % kBlocks] = belief_;
   use();
@@ -308,11 +312,12 @@ void AidedWrench::use() noexcept {
   taught_ = true;
 }
 
-/// Variance of what the platform's momentum, by the modelled legs, is off by at an instant. A leg
-/// that is early or late by an update of its LegSlave is off by K count for that long.
-Vec6 AidedWrench::legsMomentum() const noexcept {
+/// Variance of what the momentum, by the modelled legs and the joints' readings, is off by at an
+/// instant. A leg that is early or late by an update of its LegSlave is off by K count for that
+/// long.
+Vec6 AidedWrench::momentumNoise() const noexcept {
   constexpr double kShare = 0.05;  // [-] rms, of a leg that is off by K count for good: measured
-  return (kShare * noise_.legs).cwiseAbs2();
+  return (kShare * noise_.legs).cwiseAbs2() + (M_SQRT1_2 * period_ * noise_.joints).cwiseAbs2();
 }
 
 /// What the sensor reads of a wrench.
@@ -324,12 +329,26 @@ Mat6 AidedWrench::countsPerWrench(const Mat3& R_IP) const noexcept {
   return out;
 }
 
+/// What a sample's difference of the joints' momentum is off by.
+Vec6 AidedWrench::jointNoise(const Input& in) const noexcept {
+  Vec6 squared = Vec6::Zero();
+  if (joint_speed_.isZero(0.0)) return squared;
+  const Mat6 counts = countsPerWrench(in.X_IP.R);
+  for (int i = 0; i < in.carried.joints; ++i) {
+    const Wrench one = Wrench::from(
+        jointMomentum(in.carried, in.joints.q(), joint_speed_(i) * JointVector::Unit(i)));
+    squared += (counts * rotate(in.X_IP.R, transfer(X_PL0_, one)).stacked()).cwiseAbs2();
+  }
+  return M_SQRT2 / period_ * squared.cwiseSqrt();
+}
+
 /// A leg whose length is taken wrongly turns the weight; one whose acceleration is, the inertia.
 void AidedWrench::refreshNoise(const Input& in) noexcept {
   noise_.sensor = in.bias.noise();
   noise_.sensor.correlation = std::max(noise_.sensor.correlation, least_correlation_);
   noise_.weight.setZero();
   noise_.legs.setZero();
+  noise_.joints = jointNoise(in);
   const Mat6& M_1 = in.robot.M_1();
   const double mass = M_1(0, 0);
   if (!(mass > 0.0)) return;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/control/joint_momentum.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -15,11 +16,39 @@ double seconds(std::int64_t from, std::int64_t to) {
 
 }  // namespace
 
+JointParabola::JointParabola(const ControllerConfig& config) {
+  const JointSensors& sensors = config.joints;
+  const double T = std::max(config.periodSeconds(), sensors.interval),
+               deviation = sensors.deviation.maxCoeff();
+  // [1/T] of its speed so many periods after the newest but one of n readings.
+  const auto speedAfter = [](int n, double periods) {
+    Mat3 normal = Mat3::Zero();
+    for (int i = 0; i < n; ++i) {
+      const Vec3 powers(1.0, 1 - i, (1 - i) * (1 - i));
+      normal += powers * powers.transpose();
+    }
+    const Vec3 rate(0.0, 1.0, 2.0 * periods);
+    return std::sqrt(rate.dot(normal.inverse() * rate));
+  };
+  // What it is off by at the end of a cubic, to the side of a Legendre polynomial. [rad/s | m/s]
+  const auto byJerk = [&](int n) {
+    const double half = 0.5 * (n - 1) * T;
+    return 0.4 * config.compensation.joint_jerk * half * half;
+  };
+  while (readings < kMost && byJerk(readings) < deviation / T * speedAfter(readings, 1.0))
+    ++readings;
+  const double ahead = T + sensors.interval, x = config.servo.sensor_cutoff / M_SQRT2 * ahead,
+               passed = 1.0 - std::exp(-x) * (std::cos(x) + std::sin(x));  // of a step, since then
+  speed = speedAfter(readings, passed * ahead / T) / T;
+}
+
 JointMomentum::JointMomentum(const ControllerConfig& config)
-    : aided_(config.compensation.aided),
+    : compensated_(config.compensation.inertia),
+      aided_(config.compensation.aided),
       delay_(std::llround(config.servo.sensor_delay * 1e9)),
       filter_(config.servo.sensor_cutoff),
-      before_(filter_) {
+      before_(filter_),
+      fitted_(JointParabola(config).readings) {
   constexpr std::int64_t kInstant = 1'000'000;  // [ns] in which a rate hardly changes
   const std::int64_t window = std::llround(config.servo.sensor_window * 1e9);
   begin_ = window > 0 ? -window : -kInstant / 2;
@@ -28,10 +57,22 @@ JointMomentum::JointMomentum(const ControllerConfig& config)
 
 void JointMomentum::reset(const JointVector& q) noexcept {
   known_ = 0;
+  read_ = 0;
   begun_ = false;
   q_ = q;
   shown_q_dot_.setZero();
   force_ = {};
+}
+
+JointVector JointMomentum::at(const Sample& sample) const noexcept {
+  const double since = seconds(sample.joints_time, sample.time);
+  if (!compensated_ || known_ == 0 || !(since > 0.0)) return sample.q;
+  const Angles& newest = last_[2];
+  const bool fresh = sample.joints_time > newest.time;
+  if (!fresh && known_ == 1) return sample.q;
+  const Angles& before = fresh ? newest : last_[1];
+  const JointVector rate = (sample.q - before.q) / seconds(before.time, sample.joints_time);
+  return sample.q + since * rate;
 }
 
 void JointMomentum::update(const KnownPayload& known, const Sample& sample, const Mat3& R_IP,
@@ -42,6 +83,7 @@ void JointMomentum::update(const KnownPayload& known, const Sample& sample, cons
   if (known_ == 0 || sample.joints_time > last_[2].time) {
     std::rotate(last_.begin(), last_.begin() + 1, last_.end());
     last_[2] = {sample.joints_time, sample.q};
+    readings_[static_cast<std::size_t>(read_++ % JointParabola::kMost)] = last_[2];
     const bool first = known_ < 3;
     if (first) ++known_;
     if (known_ == 3) addMiddle(known, first);
@@ -85,8 +127,8 @@ void JointMomentum::relearn(const KnownPayload& known) noexcept {
                         const Channels& now) -> Channels {
     return (change(q + kStep * q_dot, q_dot + kStep * q_ddot) - now) / kStep;
   };
-  const Channels input = change(last_[1].q, q_dot_),
-                 input_rate = rate(last_[1].q, q_dot_, q_ddot_, input);
+  const Channels input = change(middle_, q_dot_),
+                 input_rate = rate(middle_, q_dot_, q_ddot_, input);
   const auto raise = [&](Filter& filter, const Channels& in) {
     const JointVector q = filter.output().head<kMaxJoints>().matrix(),
                       q_dot = filter.rate().head<kMaxJoints>().matrix(),
@@ -102,17 +144,40 @@ void JointMomentum::relearn(const KnownPayload& known) noexcept {
   momentum_ += momentum(change(q_, shown_q_dot_));
 }
 
-/// Divided differences of the three angles: they hold where the middle one was read.
-void JointMomentum::addMiddle(const KnownPayload& known, bool first) noexcept {
+/// Where the middle one of the last three angles was read.
+void JointMomentum::fit() noexcept {
   const double T_0 = seconds(last_[0].time, last_[1].time),
                T_1 = seconds(last_[1].time, last_[2].time);
-  const JointVector rate_0 = (last_[1].q - last_[0].q) / T_0,
-                    rate_1 = (last_[2].q - last_[1].q) / T_1;
-  q_dot_ = (T_0 * rate_1 + T_1 * rate_0) / (T_0 + T_1);
-  q_ddot_ = 2.0 / (T_0 + T_1) * (rate_1 - rate_0);
+  const int n = static_cast<int>(std::min<std::int64_t>(fitted_, read_));
+  if (n <= 3) {  // divided differences
+    const JointVector rate_0 = (last_[1].q - last_[0].q) / T_0,
+                      rate_1 = (last_[2].q - last_[1].q) / T_1;
+    middle_ = last_[1].q;
+    q_dot_ = (T_0 * rate_1 + T_1 * rate_0) / (T_0 + T_1);
+    q_ddot_ = 2.0 / (T_0 + T_1) * (rate_1 - rate_0);
+    return;
+  }
+  Mat3 normal = Mat3::Zero();
+  Eigen::Matrix<double, 3, kMaxJoints> right = Eigen::Matrix<double, 3, kMaxJoints>::Zero();
+  for (int i = 0; i < n; ++i) {
+    const Angles& one = readings_[static_cast<std::size_t>((read_ - 1 - i) % JointParabola::kMost)];
+    const double t = seconds(last_[1].time, one.time) / T_1;
+    const Vec3 powers(1.0, t, t * t);
+    normal += powers * powers.transpose();
+    right += powers * (one.q - last_[1].q).transpose();
+  }
+  const Eigen::Matrix<double, 3, kMaxJoints> fitted = normal.inverse() * right;
+  middle_ = last_[1].q + fitted.row(0).transpose();
+  q_dot_ = fitted.row(1).transpose() / T_1;
+  q_ddot_ = 2.0 / (T_1 * T_1) * fitted.row(2).transpose();
+}
+
+void JointMomentum::addMiddle(const KnownPayload& known, bool first) noexcept {
+  const double T_0 = seconds(last_[0].time, last_[1].time);
+  fit();
   const Channels before = input_;
-  input_.head<kMaxJoints>() = last_[1].q.array();
-  if (aided_) input_.tail<6>() = jointMomentum(known.carried(), last_[1].q, q_dot_).array();
+  input_.head<kMaxJoints>() = middle_.array();
+  if (aided_) input_.tail<6>() = jointMomentum(known.carried(), middle_, q_dot_).array();
   before_ = filter_;
   if (first) {
     filter_.settle(input_);
@@ -120,12 +185,13 @@ void JointMomentum::addMiddle(const KnownPayload& known, bool first) noexcept {
     chord_ = curve_ = rate_ = Channels::Zero();
   } else {
     const Channels chord = (input_ - before) / T_0;
-    curve_ = (chord - chord_) / T_0;
+    curve_ = 2.0 / (chord_time_ + T_0) * (chord - chord_);
     curve_.head<kMaxJoints>() = q_ddot_.array();
     rate_ = chord + 0.5 * T_0 * curve_;
     chord_ = chord;
     filter_.advanceAlong(filter_.prepare(T_0), input_, curve_);
   }
+  chord_time_ = T_0;
   rate_.head<kMaxJoints>() = q_dot_.array();
 }
 

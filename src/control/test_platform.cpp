@@ -33,20 +33,21 @@ const TickState& TestPlatform::tick(const TickInput& in) noexcept {
   const Transform& X_IP = legs_.update(samples_, elapsed, following, commander_).X_IP;  // (2.23)
 
   known_.update(elapsed, commander_.command().segment);
-  load_.update(known_, sample.q, X_IP.R, samples_.wrench().since, engaged, share_.value());
+  if (!engaged) joints_.reset(sample.q);
+  load_.update(known_, joints_.at(sample), X_IP.R, samples_.wrench().since, engaged,
+               share_.value());
   bias_.stepTare(sample, samples_.fresh(), load_.counts());
   // The measured attitude: the commanded one leads it by the servo's lag, and the difference would
   // pass as a wrench of the robot's weight.
   Wrenches W;
   W.total = forceMeasurement(config_.sensor, bias_.counts(), sample.adc, X_IP.R);  // (C.1)
   W.static_wrench = gravityCompensation(config_.payload, X_IP.R, load_.wrench());  // (B.4)
-  if (!engaged) joints_.reset(sample.q);
   joints_.update(known_, sample, X_IP.R, engaged ? samples_.wrench().since : 0.0);
   W.inertial = robot_.update(known_, elapsed.count, joints_.q(), samples_.wrench().since, X_IP,
                              legs_.feltMotion(), engaged, share_.value());
   const Wrench measured = W.total - W.static_wrench + W.inertial;
-  W.felt = aided_.update({measured, W.static_wrench, robot_, joints_, samples_, bias_, X_IP,
-                          share_.value(), known_.gripperMoved()},
+  W.felt = aided_.update({measured, W.static_wrench, known_.carried(), robot_, joints_, samples_,
+                          bias_, X_IP, share_.value(), known_.gripperMoved()},
                          engaged);
   if (aided_.taught()) {
     known_.learn(aided_.robot());

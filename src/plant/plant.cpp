@@ -12,6 +12,7 @@ double seconds(std::int64_t ns) { return static_cast<double>(ns) * kSecondPerNan
 
 constexpr std::int64_t kMidUpdate = kUpdatePeriod / 2;  // [ns]
 constexpr double kStillSpeed = 1e-9;                    // [m/s]
+constexpr std::uint32_t kJointSeed = 0x9e3779b9;        // [-] a stream of its own
 constexpr std::int64_t kSettle = 100'000'000;           // [ns] between checks whether all is still
 
 LegCounts countsAt(const PlantConfig& config, const Pose& pose) {
@@ -35,6 +36,8 @@ Plant::Plant(const PlantConfig& config)
       position_step_(filter_position_.prepare(seconds(kUpdatePeriod))),
       rate_step_(filter_velocity_.prepare(seconds(kUpdatePeriod))),
       next_step_(kNever),
+      encoders_(config.joints, Noise(config.seed ^ kJointSeed), config.task.initial_joints),
+      joints_read_(config.task.initial_joints),
       robot_(carried(config.payload), config.task.initial_joints) {
   X_SL0_ = inverse(config.payload.X_PS) * config.payload.X_PL0();
 
@@ -61,6 +64,7 @@ Plant::Plant(const PlantConfig& config)
       truth_.target = config_.task.world->environment.target->start;
   }
   sensor_.settle(sensorLoad());
+  if (config.joints.interval > 0) next_joints_ = config.joints.interval;
   if (config.sensor_readings > 1) {
     sensor_interval_ = config.sensor_window / config.sensor_readings;
     next_sensor_ = sensor_interval_ / 2;
@@ -158,6 +162,8 @@ void Plant::skip(std::int64_t until) noexcept {
   next_reading_ += time;
   if (next_step_ != kNever) next_step_ += time;
   if (next_sensor_ != kNever) next_sensor_ += time;
+  if (next_joints_ != kNever) next_joints_ += time;
+  joints_time_ += time;
 }
 
 void Plant::advance(std::int64_t until) noexcept {
@@ -169,7 +175,7 @@ void Plant::advance(std::int64_t until) noexcept {
 void Plant::runEvents(std::int64_t until) noexcept {
   for (;;) {
     const std::int64_t next =
-        std::min({next_reading_, next_step_, next_sensor_, next_robot_event_});
+        std::min({next_reading_, next_step_, next_sensor_, next_joints_, next_robot_event_});
     if (next > until) break;
     moveActuators(next);
     if (next == next_robot_event_) startRobotEvents();
@@ -180,6 +186,10 @@ void Plant::runEvents(std::int64_t until) noexcept {
     if (next == next_sensor_) {
       readSensor();
       next_sensor_ += sensor_interval_;
+    }
+    if (next == next_joints_) {
+      readJoints();
+      next_joints_ += config_.joints.interval;
     }
     if (next == next_reading_) {
       readTransducers();
@@ -342,6 +352,12 @@ void Plant::readSensor() noexcept {
   sensor_readings_[read_++ % sensor_readings_.size()] = sensor_.convert(warmer);
 }
 
+void Plant::readJoints() noexcept {
+  stepMechanics();
+  joints_time_ = now_;
+  joints_read_ = encoders_.read(truth_.joints.q);
+}
+
 /// The newest window that is over: each reading is the middle of its part of it.
 void Plant::averageSensor(Sample& s) const noexcept {
   const std::int64_t newest = next_sensor_ - sensor_interval_;
@@ -373,7 +389,9 @@ Sample Plant::sample() noexcept {
     s.legs[i] = config_.transducer.count(actuators_[i].length());
     truth_.current(static_cast<Eigen::Index>(i)) = slaves_[i].current();
   }
-  s.q = truth_.joints.q;
+  if (next_joints_ == kNever) readJoints();
+  s.joints_time = joints_time_;
+  s.q = joints_read_;
   s.switches = kAllSwitchesClosed;
   for (std::size_t i = 0; i < config_.faults.size(); ++i) {
     const FaultEvent& event = config_.faults[i];

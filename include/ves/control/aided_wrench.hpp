@@ -22,6 +22,8 @@ struct ResidualNoise {
   Vec6 weight = Vec6::Zero();  // [count^2] from the attitude by rounded lengths, turning the weight
   Vec6 legs = Vec6::Zero();    // [count s] of a leg that takes its next count sooner or later than
                                // modelled, and so goes K count quicker; per [1/s] of largestFelt()
+  Vec6 joints = Vec6::Zero();  // [count] of a sample from the joints' readings, which give their
+                               // momentum; of a mean it is what both its ends are off by
 };
 
 /// Whether the mean of residuals over some samples is more than noise, in any channel.
@@ -60,6 +62,7 @@ class AidedWrench {
   struct Input {
     const Wrench& measured;  // F_Po_I that the sensor shows beyond weight and inertia
     const Wrench& weight;    // F_Po_I
+    const RobotModel& carried;
     const RobotInertia& robot;
     const JointMomentum& joints;
     const SampleStream& samples;
@@ -106,14 +109,17 @@ class AidedWrench {
   void use() noexcept;
   Mat6 countsPerWrench(const Mat3& R_IP) const noexcept;  // about Po in I
   void refreshNoise(const Input& in) noexcept;
-  Vec6 legsMomentum() const noexcept;  // [count^2 s^2]
+  Vec6 jointNoise(const Input& in) const noexcept;  // [count]
+  Vec6 momentumNoise() const noexcept;              // [count^2 s^2]
 
   bool aided_;
   int hold_;  // [-] samples
   Vec3 gravity_;
   Geometry geometry_;
-  double rounding_;      // [m] of a leg, rms
-  Vec6 speed_of_count_;  // [m/s] K times a count
+  double period_;            // [s]
+  double rounding_;          // [m] of a leg, rms
+  Vec6 speed_of_count_;      // [m/s] K times a count
+  JointVector joint_speed_;  // [rad/s | m/s] rms, by readings of joints
   Transform X_SP_;
   Mat6 S_proc_;  // [count per N | N m]
   Transform X_PL0_;

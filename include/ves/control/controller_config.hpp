@@ -32,6 +32,7 @@ struct Compensation {
   double hand_center = 0.1;        // [m] and how far from the tool's origin its centre may be
   double gate = 4.5;               // [-] deviations of the noise that a residual has to be above
   double gate_hold = 0.1;          // [s] for which it passes then
+  double joint_jerk = 10.0;        // [rad/s^3 | m/s^3] of the robot's joints
   // What the belief may be wrong by, for which the loop has to decay (analysis/gate.hpp).
   double timing_error = 0.0;  // [s] of the wrench
   double gain_error = 0.0;    // [-] of the servos
@@ -75,14 +76,21 @@ struct ToldLoads {
   std::array<ToldLoad, kMaxToldLoads> loads{};  // by segment and time
 };
 
+/// How well the robot's joint angles are known.
+struct JointSensors {
+  JointVector deviation = JointVector::Zero();  // [rad | m] of a reading: count, play and noise
+  double interval = 0.0;                        // [s] between two readings; 0: read when asked
+};
+
 /// What the controller takes the machine, its load and the vehicle for: from data sheets,
 /// identifications and guesses. What judges or decides for it (stability, limits, plans) knows this
 /// and nothing more; what the machine truly is, plant::PlantConfig says.
 struct Belief {
   Geometry geometry;
   ForceSensor sensor;
-  Vec6 bias = Vec6::Zero();          // [count] until a calibration replaces it
-  Payload payload;                   // what the sensor carries,
+  Vec6 bias = Vec6::Zero();  // [count] until a calibration replaces it
+  Payload payload;           // what the sensor carries,
+  JointSensors joints;
   Hand hand;                         // where the robot holds things,
   ToldLoads told_loads;              // and what it takes in hand
   Vec3 gravity = {0.0, 0.0, -9.81};  // [m/s^2] g_I

@@ -8,6 +8,19 @@
 
 namespace ves {
 
+/// The parabola that the joints' angles run along.
+struct JointParabola {
+  static constexpr int kMost = 40;
+  /// [-] the newest readings that it is laid through by least squares: three where they are exact;
+  /// else so many that by their noise and by a steady jerk its speed is as far off.
+  int readings = 3;
+  /// [1/s] deviation of the speed that it foretells until the next reading, behind the sensor's
+  /// filter, where each reading has one of 1.
+  double speed = 0.0;
+
+  explicit JointParabola(const ControllerConfig& config);
+};
+
 /// The joints' angles and their momentum behind the sensor's filter and delay.
 class JointMomentum {
  public:
@@ -20,6 +33,9 @@ class JointMomentum {
   void update(const KnownPayload& known, const Sample& sample, const Mat3& R_IP,
               double since) noexcept;
 
+  /// [rad | m] Where the joints are at the sample's time, if they were read before: they go on as
+  /// fast as of late. The reading itself where no inertia is compensated.
+  JointVector at(const Sample& sample) const noexcept;
   const JointVector& q() const noexcept { return q_; }  // [rad | m] as the wrench shows them
   const JointVector& q_dot() const noexcept { return shown_q_dot_; }  // [rad/s | m/s] the same
   /// F_Po_I of the joints on a base at rest: what the momentum has lost since the sample before,
@@ -37,21 +53,27 @@ class JointMomentum {
   using Filter = Butterworth2<kMaxJoints + 6>;  // of angles and momentum
   using Channels = Filter::Channels;
 
+  void fit() noexcept;
   void relearn(const KnownPayload& known) noexcept;
   void addMiddle(const KnownPayload& known, bool first) noexcept;
   Filter filtered(std::int64_t time) const noexcept;
   Vec6 momentum(const Channels& filtered) const noexcept;
 
-  bool aided_;
+  bool compensated_, aided_;
   std::int64_t delay_;            // [ns] of the sensor, ServoModel
   std::int64_t begin_, end_;      // [ns] of what it shows, after the wrench
   Filter filter_, before_;        // at the middle one of the angles, and at the oldest
   std::array<Angles, 3> last_{};  // the oldest first
   int known_ = 0;                 // [-] of them
+  int fitted_;                    // [-] readings
+  std::array<Angles, JointParabola::kMost> readings_{};  // a ring
+  std::int64_t read_ = 0;                                // [-] so far
   // At the middle one, not filtered.
+  JointVector middle_ = JointVector::Zero();
   JointVector q_dot_ = JointVector::Zero(), q_ddot_ = JointVector::Zero();
   Channels input_ = Channels::Zero(), rate_ = Channels::Zero(), curve_ = Channels::Zero();
-  Channels chord_ = Channels::Zero();  // rate from the one before to it
+  Channels chord_ = Channels::Zero();  // rate from the one before to it,
+  double chord_time_ = 0.0;            // [s] which took so long
   JointVector q_ = JointVector::Zero(), shown_q_dot_ = JointVector::Zero();
   Transform X_PL0_;
   Mat3 R_IP_ = Mat3::Identity();

@@ -24,6 +24,7 @@
 #include "ves/plant/actuator.hpp"
 #include "ves/plant/faults.hpp"
 #include "ves/plant/force_torque_sensor.hpp"
+#include "ves/plant/joint_encoders.hpp"
 #include "ves/plant/leg_slave.hpp"
 #include "ves/robot/newton_euler.hpp"
 #include "ves/robot/payload.hpp"
@@ -60,6 +61,7 @@ struct PlantConfig {
   int sensor_readings = 1;         // [-] that a sample's wrench is the mean of,
   std::int64_t sensor_window = 0;  // [ns] and over which; 1: read when asked
   Climate climate;
+  JointEncoderModel joints;
   Payload payload;                   // as it is
   Vec3 gravity = {0.0, 0.0, -9.81};  // [m/s^2] g_I
   RobotTask task;
@@ -131,6 +133,7 @@ class Plant {
   void stepMechanics() noexcept;
   void readSensor() noexcept;
   void averageSensor(Sample& sample) const noexcept;
+  void readJoints() noexcept;
   void planRobotEvent() noexcept;
   void startRobotEvents() noexcept;
   Wrench sensorLoad() noexcept;
@@ -161,6 +164,10 @@ class Plant {
   std::int64_t next_sensor_ = kNever;              // [ns]
   std::vector<AdcCounts> sensor_readings_;         // a ring, a reading longer than the window
   std::size_t read_ = 0;                           // [-] readings so far
+  JointEncoders encoders_;
+  std::int64_t next_joints_ = kNever;  // [ns]
+  std::int64_t joints_time_ = 0;       // [ns] when joints_read_ was
+  JointVector joints_read_;
   std::int64_t sequence_ = -1;
   std::int64_t segment_ = -1;                           // of the program, as last commanded
   bool outside_ = true;                                 // of it, by the last command
