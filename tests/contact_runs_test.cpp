@@ -442,6 +442,35 @@ TEST(ContactInFreeSpace, AWorldThatNobodyTouchesChangesNothing) {
   EXPECT_GT(moved, 1e-3);
 }
 
+// What vehicle, robot and ball have gained more than in free space is what the controller's own
+// account says that the emulation has put in, which knows nothing of the vehicle's place or of the
+// ball.
+TEST(ContactResults, EnergyErrorIsWhatTheEmulationHasPutIn) {
+  for (const char* robot : {"doss", "puma"})
+    for (const bool compensated : {false, true}) {
+      const std::string in = compensated ? "true" : "false";
+      const Experiment e = test::experiment(
+          std::string("contact_rebound_") + robot,
+          {"sensor.noise=false", "controller.compensation.feed_forward=" + in,
+           "controller.compensation.observer=" + in, "controller.compensation.inertia=" + in});
+      const RecordedRun run = recordLockstep(e);
+      ASSERT_TRUE(run.result.good());
+      const auto pairs = contactPairs(run.series, emulation(run.series));
+      ASSERT_EQ(pairs.size(), 1U);
+      const Contact &ours = *pairs[0].emulated, &due = *pairs[0].free_space;
+      const double approach =
+          0.5 * due.impulse.norm() * due.approach * due.approach / (due.approach + due.separation);
+      const double after = ours.began + ours.duration + ContactPair::kAfter;
+      double put_in = 0.0, last = 0.0;
+      eachTick(run.series, [&](const Row& row, double t) {
+        if (t <= ours.began) put_in = -row.state.energy_put_in;
+        if (t > ours.began && t <= after) last = row.state.energy_put_in;
+      });
+      put_in += last;
+      EXPECT_NEAR(pairs[0].energy_error, put_in / approach, 0.07) << robot << compensated;
+    }
+}
+
 // What a run says of its contacts, beside what the plant knew and free space.
 TEST(ContactResults, StandBesideFreeSpace) {
   const Experiment e = test::experiment("contact_rebound_puma", {"sensor.noise=false"});
@@ -473,8 +502,8 @@ TEST(ContactResults, StandBesideFreeSpace) {
   }
   EXPECT_NEAR(one["began_s"].get<double>(), one["free_space_began_s"].get<double>(), 0.02);
   const double e_ = s["contact_restitution"], due = s["contact_restitution_free_space"];
-  EXPECT_NEAR(e_, due, 0.03);
-  EXPECT_NEAR(s["contact_energy_error"].get<double>(), e_ * e_ - due * due, 1e-12);
+  EXPECT_NEAR(e_, due, 0.04);
+  EXPECT_LT(std::abs(s["contact_energy_error"].get<double>()), 0.06);
   EXPECT_EQ(s["contact_peak_n"], known.peak);
   EXPECT_LT(std::abs(s["energy_put_in_j"].get<double>()), 2e-3);
   EXPECT_FALSE(s.contains("energy_paid_j"));

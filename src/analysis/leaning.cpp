@@ -226,8 +226,9 @@ struct Comer {
   double inverse_mass, p = 0.0, v = 0.0;  // [1/kg]; [m], [m/s] along the direction
   double work = 0.0;                      // [J] done on the robot
   bool parted = false;
-  double duration = 0.0, peak = 0.0;     // [s], [N]
-  double separation = 0.0, since = 0.0;  // [m/s], a mean over the time since, [s]
+  double duration = 0.0, peak = 0.0;                   // [s], [N]
+  double separation = 0.0, since = 0.0;                // [m/s], [s]
+  double first_gap = 0.0, near = 0.0, near_gap = 0.0;  // [m], [s] after it, [m]
 
   /// The force on the robot over a substep in which its place along the direction goes from a to b.
   double meet(const Leaning& lean, double a, double b, double dt) {
@@ -235,7 +236,18 @@ struct Comer {
     const double gap = 0.5 * (a + b) - (p + 0.5 * dt * v), rate = (b - a) / dt - v;
     double force = -lean.stiffness * gap - lean.damping * rate;
     parted = parted || (duration > 0.0 && gap > 0.0);
-    if (parted && since < ContactWatch::kMean) separation = gap / (since += dt);
+    if (parted && first_gap == 0.0) {
+      first_gap = gap;
+    } else if (parted && since < 2.0 * ContactWatch::kApart) {
+      since += dt;
+      if (since < ContactWatch::kApart + 0.5 * dt) {
+        near = since;
+        near_gap = gap - first_gap;
+        separation = near_gap / near;
+      } else {
+        separation = endSpeed(near, near_gap, since, gap - first_gap);
+      }
+    }
     if (parted || !(gap < 0.0) || !(force > 0.0)) force = 0.0;
     if (!parted) duration += dt;
     peak = std::max(peak, force);

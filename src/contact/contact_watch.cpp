@@ -5,17 +5,25 @@
 
 namespace ves {
 
-double ContactWatch::closedAt(double t) const noexcept {
-  Place after{t, 0.0};
+double ContactWatch::gapAt(double t) const noexcept {
   const std::size_t known = std::min(places_, before_.size());
+  Place after{t, NAN};
   for (std::size_t i = 1; i <= known; ++i) {
     const Place& place = before_[(places_ - i) % before_.size()];
-    const double then = t - kMean;
-    if (place.t <= then)
-      return (place.gap + (after.gap - place.gap) * (then - place.t) / (after.t - place.t)) / kMean;
+    if (place.t == t) return place.gap;
+    if (place.t < t)
+      return place.gap + (after.gap - place.gap) * (t - place.t) / (after.t - place.t);
     after = place;
   }
-  return after.t < t ? after.gap / (t - after.t) : 0.0;
+  return NAN;
+}
+
+double ContactWatch::closedAt(double t) const noexcept {
+  const double near = gapAt(t - kApart), far = gapAt(t - 2.0 * kApart);
+  if (std::isfinite(near) && std::isfinite(far)) return endSpeed(kApart, near, 2.0 * kApart, far);
+  const std::size_t known = std::min(places_, before_.size());
+  const Place first = known > 0 ? before_[(places_ - known) % before_.size()] : Place{t, 0.0};
+  return first.t < t ? first.gap / (t - first.t) : 0.0;
 }
 
 void ContactWatch::see(double t, const Touch& now) noexcept {
@@ -42,13 +50,22 @@ void ContactWatch::see(double t, const Touch& now) noexcept {
     before_[0] = {changed, 0.0};
     places_ = 1;
   }
-  if (parted_ >= 0.0 && t - parted_ >= kMean) {
-    const double then = parted_ + kMean, from = std::max(t_, parted_),
-                 gap = touching_ ? 0.0 : gap_;  // at `from`
-    contact_.separation = (gap + (now.least - gap) * (then - from) / (t - from)) / kMean;
-    parted_ = -1.0;
+  if (parted_ >= 0.0) {
+    const double from = std::max(t_, parted_), gap = touching_ ? 0.0 : gap_;  // at `from`
+    const auto at = [&](double then) {
+      return gap + (now.least - gap) * (then - from) / (t - from);
+    };
+    const double near = parted_ + kApart, far = near + kApart;
+    if (from < near && near <= t) {
+      opened_ = at(near);
+      contact_.separation = opened_ / kApart;  // all that is known if it touches again
+    }
+    if (far <= t) {
+      contact_.separation = endSpeed(kApart, opened_, 2.0 * kApart, at(far));
+      parted_ = -1.0;
+    }
   }
-  if (!touches && (places_ == 0 || t - before_[(places_ - 1) % before_.size()].t >= kApart))
+  if (!touches && (places_ == 0 || t - before_[(places_ - 1) % before_.size()].t >= kStep))
     before_[places_++ % before_.size()] = {t, now.least};
   touching_ = touches;
   t_ = t;

@@ -103,9 +103,7 @@ Vec6 restOf(const ModalModel& base, const Vec6& x) {
 std::optional<Motion> baseMotion(const Experiment& e, const Vec6& start,
                                  ReferenceMotions& references,
                                  const std::vector<TimedAction>* pushes) {
-  if (!wantsAdmittance(e.controller.program) ||
-      e.controller.admittance.stiffness.size() > kMostComparedModes)
-    return {};
+  if (!wantsAdmittance(e.controller.program)) return {};
   std::int64_t duration = 0;
   Interaction interaction = interactionOf(e, duration);
   const Eigen::VectorXd eta = leastSquares(interaction.base.Phi, start);
@@ -131,10 +129,6 @@ std::string whyNotCompared(const Series& series) {
   if (!std::all_of(series.rows.begin(), series.rows.end(),
                    [](const Row& row) { return ofConfiguredVehicle(row.state); }))
     return "the vehicle was changed on the way";
-  if (const auto modes = series.experiment.controller.admittance.stiffness.size();
-      modes > kMostComparedModes)
-    return fmt::format("the base has {} modes; base.keep_modes={} or fewer is compared", modes,
-                       kMostComparedModes);
   return "";
 }
 
@@ -217,6 +211,7 @@ Motion motion(const std::vector<InteractionPoint>& points) {
     out.x.push_back(p.x);
     out.x_dot.push_back(p.x_dot);
     out.on_tool.push_back(p.touch.on_tool_To_I.f.norm());
+    out.target.push_back(p.target);
     const auto begun = static_cast<std::size_t>(p.contacts.count());
     if (begun == 0) continue;
     out.contacts.resize(begun);  // of those that began between two points the last is known

@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "ves/math/dense.hpp"
+
 namespace ves {
 namespace {
 
@@ -49,10 +51,74 @@ std::vector<Contact> contactsOf(const Series& series) {
   return out;
 }
 
-double ContactPair::energyError() const {
-  if (!emulated || !free_space || !emulated->over() || !free_space->over()) return NAN;
-  return std::pow(emulated->restitution(), 2) - std::pow(free_space->restitution(), 2);
+namespace {
+
+/// [J] of the vehicle with a robot that moves as one body, and of what floats.
+double energy(const Experiment& e, const Vec6& x, const Vec6& x_dot, const JointVector& q,
+              const Floating& floating) {
+  const ModalModel& base = e.controller.admittance;
+  const Payload& payload = e.plant.payload;
+  const RigidBody robot_P =
+      combine(RigidBody{}, payload.X_PL0(), compositeBody(carried(payload), q));
+  const Mat6 M_1 = spatialMass(rotated(rotation(x.tail<3>()), robot_P));
+  const Eigen::VectorXd eta = leastSquares(base.Phi, x), eta_dot = leastSquares(base.Phi, x_dot);
+  double twice =
+      eta_dot.squaredNorm() + eta.dot(base.stiffness.cwiseProduct(eta)) + x_dot.dot(M_1 * x_dot);
+  const Environment& environment = e.plant.task.world->environment;
+  if (const auto& target = environment.target) {
+    const Mat3 R = floating.q.toRotationMatrix();
+    const Vec3 w_B = R.transpose() * floating.w;
+    twice += target->mass * (floating.v.squaredNorm() - 2.0 * environment.gravity.dot(floating.p)) +
+             w_B.dot(target->I_Bcm_B * w_B);
+  }
+  return 0.5 * twice;
 }
+
+/// [J] by tick of the segment: in the run, and in free space with the joints where they were in it.
+struct Energies {
+  std::vector<double> t, emulated, free_space;  // [s], [J], [J]
+};
+Energies energies(const Series& series, const Motion& base) {
+  std::vector<double> t;
+  std::vector<const truth_t*> rows;
+  eachTick(series, [&](const Row& row, double since) {
+    if (!row.hasTruePose()) return;
+    t.push_back(since);
+    rows.push_back(&row.truth);
+  });
+  Energies out;
+  for (std::size_t i = 1; i + 1 < std::min(rows.size(), base.target.size()); ++i) {
+    // Over a tick before and after: within one a platform's speed swings.
+    const double time = t[i + 1] - t[i - 1];
+    const auto place = [&](std::size_t k) { return Vec6::Map(rows[k]->x); };
+    const Vec6 x_dot = (place(i + 1) - place(i - 1)) / time,
+               due_dot = (base.x[i + 1] - base.x[i - 1]) / (base.t[i + 1] - base.t[i - 1]);
+    const JointVector q = JointVector::Map(rows[i]->q);
+    Floating floating;
+    floating.p = Vec3::Map(rows[i]->target_p);
+    floating.q.coeffs() = Eigen::Vector4d::Map(rows[i]->target_q);
+    floating.v = Vec3::Map(rows[i]->target_v);
+    floating.w = Vec3::Map(rows[i]->target_w);
+    out.t.push_back(t[i]);
+    out.emulated.push_back(energy(series.experiment, place(i), x_dot, q, floating));
+    out.free_space.push_back(energy(series.experiment, base.x[i], due_dot, q, base.target[i]));
+  }
+  return out;
+}
+
+/// [J] gained from before `contact` until ContactPair::kAfter later, or until `next` [s].
+double gained(const std::vector<double>& t, const std::vector<double>& energy,
+              const Contact& contact, double next) {
+  const double end = contact.began + contact.duration;
+  const auto after =
+      std::upper_bound(t.begin(), t.end(), std::min(end + ContactPair::kAfter, next));
+  const auto before = std::upper_bound(t.begin(), t.end(), contact.began);
+  if (before - t.begin() < 2 || after == t.begin() || *(after - 1) <= end) return NAN;
+  return energy[static_cast<std::size_t>(after - 1 - t.begin())] -
+         energy[static_cast<std::size_t>(before - 2 - t.begin())];
+}
+
+}  // namespace
 
 std::vector<ContactPair> contactPairs(const Series& series, const std::optional<Emulation>& e) {
   const std::vector<Contact> emulated = contactsOf(series),
@@ -60,6 +126,21 @@ std::vector<ContactPair> contactPairs(const Series& series, const std::optional<
   std::vector<ContactPair> out(std::max(emulated.size(), free_space.size()));
   for (std::size_t i = 0; i < emulated.size(); ++i) out[i].emulated = emulated[i];
   for (std::size_t i = 0; i < free_space.size(); ++i) out[i].free_space = free_space[i];
+  if (out.empty() || !e) return out;
+  const Energies known = energies(series, e->base);
+  const auto next = [](const std::vector<Contact>& all, std::size_t i) {
+    return i + 1 < all.size() ? all[i + 1].began : HUGE_VAL;
+  };
+  for (std::size_t i = 0; i < std::min(emulated.size(), free_space.size()); ++i) {
+    const Contact &ours = emulated[i], &due = free_space[i];
+    if (!ours.over() || !due.over()) continue;
+    // Newton: the impulse is what mass meets, times the speeds' sum.
+    const double mass = due.impulse.norm() / (due.approach + due.separation),
+                 approach = 0.5 * mass * due.approach * due.approach;
+    out[i].energy_error = (gained(known.t, known.emulated, ours, next(emulated, i)) -
+                           gained(known.t, known.free_space, due, next(free_space, i))) /
+                          approach;
+  }
   return out;
 }
 
@@ -76,7 +157,7 @@ void addContacts(const Series& series, const std::optional<Emulation>& e,
       if (pair.emulated) one[name] = value(*pair.emulated);
       if (pair.free_space) one[std::string("free_space_") + name] = value(*pair.free_space);
     }
-    one["energy_error"] = pair.energyError();
+    one["energy_error"] = pair.energy_error;
     all.push_back(one);
     emulated += pair.emulated.has_value();
     free_space += pair.free_space.has_value();
@@ -93,7 +174,7 @@ void addContacts(const Series& series, const std::optional<Emulation>& e,
       out["contact_restitution"] = first.emulated->restitution();
     if (first.free_space && first.free_space->over())
       out["contact_restitution_free_space"] = first.free_space->restitution();
-    if (const double error = first.energyError(); std::isfinite(error))
+    if (const double error = first.energy_error; std::isfinite(error))
       out["contact_energy_error"] = error;
   }
   out["contact_list"] = all;
@@ -152,7 +233,7 @@ void writeContacts(const std::vector<ContactPair>& pairs, const std::string& fil
       out.print("{}", i + 1);
       for (const auto& [name, value] : kFigures)
         out.print(",{},{}", number(pairs[i].emulated, value), number(pairs[i].free_space, value));
-      out.print(",{}\n", pairs[i].energyError());
+      out.print(",{}\n", pairs[i].energy_error);
     }
   } catch (const std::system_error& error) {
     throw InputError(fmt::format("{}: cannot be written: {}", file, error.what()));

@@ -21,6 +21,7 @@ struct Motion {
   std::vector<Vec6> x, x_dot;  // [m, rad], [m/s, rad/s]
   // Of the base in free space, where there is something to touch:
   std::vector<double> on_tool;  // [N] of what it touches or grips
+  std::vector<Floating> target;
   std::vector<Contact> contacts;
 
   /// x, `after` points after the first one; none outside the motion.
@@ -87,9 +88,8 @@ class ReferenceMotions {
 };
 
 /// The robot on its base in free space, in the first admittance segment of the program, let go at
-/// `start` from home: a point a tick. None without admittance control, where so many modes are kept
-/// that it would take longer than the run, and where the motion grows without bound. `pushes` that
-/// there were take the place of the program's.
+/// `start` from home: a point a tick. None without admittance control, and where the motion grows
+/// without bound. `pushes` that there were take the place of the program's.
 std::optional<Motion> baseMotion(const Experiment& experiment, const Vec6& start,
                                  ReferenceMotions& references,
                                  const std::vector<TimedAction>* pushes = nullptr);
@@ -110,9 +110,6 @@ std::vector<TimedAction> pushesOf(const Series& series);
 
 /// Whether the vehicle is the configuration's, which an order may have changed.
 bool ofConfiguredVehicle(const state_t& state) noexcept;
-
-/// With more the motion in free space takes longer to compute than the run.
-inline constexpr int kMostComparedModes = 12;  // [-]
 
 /// What keeps a run with admittance control from being compared with its base in free space; empty
 /// when nothing does, or there was none.

@@ -20,9 +20,11 @@ std::vector<Contact> contactsOf(const Series& series);
 struct ContactPair {
   std::optional<Contact> emulated, free_space;
 
-  /// [-] of the energy of approach, by which what parts has more than in free space: the difference
-  /// of the restitutions squared. NaN unless both are over.
-  double energyError() const;
+  /// [-] of the energy of approach in free space, by which vehicle, robot and what floats have
+  /// gained more from before the contact until kAfter later than in free space, or until they touch
+  /// again. The work of the robot's joints counts in both. NaN unless both are over.
+  double energy_error = NAN;
+  static constexpr double kAfter = 0.5;  // [s] in which the machine has answered
 };
 std::vector<ContactPair> contactPairs(const Series& series, const std::optional<Emulation>& e);
 
