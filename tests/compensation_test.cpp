@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <random>
 
+#include "support/misbelief.hpp"
 #include "support/poses.hpp"
 #include "support/rig.hpp"
 #include "support/robots.hpp"
@@ -337,21 +338,6 @@ TEST_F(Emulation, JointsThatAreReadToCountsAndSeldomCostLittle) {
   }
 }
 
-/// Every body's mass and centre believed wrongly, each by its own share of up to a tenth, beside a
-/// common one.
-void misbelieve(Payload& payload, std::mt19937& random) {
-  constexpr double kMost = 0.1;
-  std::uniform_real_distribution<double> off(-kMost, kMost);
-  const double common = 1.0 + off(random);
-  const auto change = [&](RigidBody& body) {
-    body = scaledDensity(common * (1.0 + off(random)), body);
-    body.p_BoBcm_B *= 1.0 + off(random);
-  };
-  change(payload.robot.base);
-  for (int i = 0; i < payload.robot.size; ++i)
-    change(payload.robot.links[static_cast<std::size_t>(i)].body);
-}
-
 // Masses off link by link: a tilt of the standing robot tells what a motion of its joints alone
 // does not.
 TEST_F(Emulation, ATiltTellsMassesThatAreOffLinkByLink) {
@@ -373,7 +359,7 @@ TEST_F(Emulation, ATiltTellsMassesThatAreOffLinkByLink) {
                                 tilt, joint, to)},
                    kMean));
           std::mt19937 same = random;
-          misbelieve(e.controller.payload, same);
+          test::misbelieve(e.controller.payload, same);
           if (*tilt) random = same;
           const Series series = run(e);
           ASSERT_TRUE(result_.good()) << name << gravity << k;
@@ -389,11 +375,12 @@ TEST_F(Emulation, ATiltTellsMassesThatAreOffLinkByLink) {
 
 /// An arm that takes 3 kg in hand at 6 s and swings back later; `events` besides.
 Experiment takesALoad(const std::string& scenario, const std::string& swing, double to, double back,
-                      const std::string& events) {
+                      const std::string& events, bool switched = false) {
   return experiment(
       scenario, with(kCompensated, kAidedWrench),
       with({"gravity_m_per_s2=9.81", "base.keep_modes=6",
             "controller.compensation.learns_masses=true",
+            fmt::format("robot.gripper_switch={}", switched),
             fmt::format("program=[{{move: {{}}}}, {{calibration: {{}}}}, {{admittance: "
                         "{{duration_s: 20}}, robot: [{{at_s: 0, duration_s: 4, joint: {0}, "
                         "to_deg_or_m: {1}}}, {3}{{at_s: 8.5, duration_s: 4, joint: {0}, "
@@ -419,14 +406,17 @@ TEST_F(Emulation, AnUntoldLoadIsLearntOnceTheGripperIsToldToHaveMoved) {
     std::string what, events;
     double doss, puma;  // [-] of the travel, at most
   };
-  const Case cases[] = {{"now", load + moved(6.0), 0.01, 0.02},
+  const Case cases[] = {{"by its switch", load, 0.01, 0.02},
+                        {"now", load + moved(6.0), 0.01, 0.02},
                         {"early", moved(5.75) + load, 0.01, 0.02},
                         {"late", load + moved(6.25), 0.03, 0.15},
                         {"in vain", moved(6.0), 0.01, 0.02}};
   for (const auto& [what, events, doss, puma] : cases)
     for (const bool is_doss : {true, false}) {
-      const Experiment e = is_doss ? takesALoad("srms_capture_doss", "joint_3", -60, -90, events)
-                                   : takesALoad("srms_capture_puma", "joint_1", 30, 0, events);
+      const bool tells = events == load;
+      const Experiment e = is_doss
+                               ? takesALoad("srms_capture_doss", "joint_3", -60, -90, events, tells)
+                               : takesALoad("srms_capture_puma", "joint_1", 30, 0, events, tells);
       const Series series = run(e);
       ASSERT_TRUE(result_.good());
       EXPECT_LT(share(e, series), is_doss ? doss : puma) << e.name << what;

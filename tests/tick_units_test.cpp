@@ -282,6 +282,22 @@ TEST(StaticLoad, GoesThroughTheSensorsFilterByTheShareOnly) {
   EXPECT_LT((published.wrench().stacked() - all.wrench().stacked()).norm(), 1e-6);
 }
 
+// Each change of the gripper's switch is told once, in its tick; where it stands at first is none.
+TEST(KnownPayload, KnowsThatTheGripperMovedByItsSwitch) {
+  for (const bool switched : {false, true}) {
+    ControllerConfig config = puma();
+    config.hand.switched = switched;
+    KnownPayload known(config);
+    bool before = true;
+    for (const bool closed : {true, true, false, false, true, true, true, false}) {
+      known.readGripper(kAllSwitchesClosed | (closed ? kGripperClosed : 0U));
+      known.update({}, -1);
+      EXPECT_EQ(known.gripperMoved(), switched && closed != before);
+      before = closed;
+    }
+  }
+}
+
 // A joint angle that is none spoils its own tick, and none after it, whatever is learnt meanwhile.
 TEST(StaticLoad, ForgetsAnAngleThatIsNone) {
   ControllerConfig config = puma();

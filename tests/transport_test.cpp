@@ -27,7 +27,7 @@ Sample goodSample() {
   s.adc = {1, -2, 32767, -32768, 5, 6, 7};
   s.legs = {0, 16383, 8000, 8001, 8002, 8003};
   s.q.head<3>() << 0.1, -0.2, 0.3;
-  s.switches = kAllSwitchesClosed;
+  s.switches = kAllSwitches;
   return s;
 }
 

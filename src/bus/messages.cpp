@@ -161,7 +161,7 @@ std::optional<Sample> fromMessage(const sample_t& m) noexcept {
   if (!s) return {};
   s->sequence = m.header.sequence;
   s->time = m.header.time_ns;
-  s->switches &= kAllSwitchesClosed;
+  s->switches &= kAllSwitches;
   for (std::int64_t* t : {&s->legs_time, &s->wrench_time, &s->joints_time})
     if (*t == 0) *t = s->time;
   return ifPlausible(*s);

@@ -176,6 +176,7 @@ Experiment build(const Value& document, AskedKey* asked = nullptr) {
     c.payload.robot = out.robot.model;
     p.task.initial_joints = robot.q;
     p.joints = robot.encoders;
+    p.gripper_switch = c.hand.switched = robot.gripper_switch;
     c.joints.deviation =
         ((robot.encoders.count.cwiseAbs2() + robot.encoders.play.cwiseAbs2()) / 12.0 +
          robot.encoders.noise.cwiseAbs2())
@@ -189,7 +190,13 @@ Experiment build(const Value& document, AskedKey* asked = nullptr) {
     if (!out.robot.choice.empty()) out.source.warnings.push_back(out.robot.choice);
   }
 
-  if (const NamedFrame* tool = out.robot.tool()) c.hand = {tool->link, tool->X_link.p};
+  if (const NamedFrame* tool = out.robot.tool()) {
+    c.hand.link = tool->link;
+    c.hand.p_LT_L = tool->X_link.p;
+  } else if (c.hand.switched) {
+    root.section("robot").fail("gripper_switch",
+                               "the robot has no tool, want one: a frame at its end");
+  }
   p.geometry = c.geometry;
   p.initial_pose = readPose(root.section("initial_pose"));
   p.leg_slave = legs.gains;

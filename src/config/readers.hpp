@@ -69,6 +69,7 @@ struct Robot {
   RigidBody adapter_R;
   JointVector q = JointVector::Zero();
   plant::JointEncoderModel encoders;
+  bool gripper_switch = false;
 };
 Robot readRobot(Section s, const Value& document);
 /// Fails at `key` unless the joint may be at q [rad | m].

@@ -154,6 +154,7 @@ Robot readRobot(Section s, const Value& document) {
   robot.X_RL0 = {rotation(s.vector("mount_rpy_deg", 3, -360.0, 360.0) * kDegree),
                  s.vector("mount_m", 3, -10.0, 10.0)};
   robot.q = initialJoints(s, robot.urdf);
+  if (s.has("gripper_switch")) robot.gripper_switch = s.flag("gripper_switch");
   if (s.has("encoders")) robot.encoders = readEncoders(s.section("encoders"), robot.urdf.model);
   s.finish();
   return robot;

@@ -12,7 +12,8 @@ KnownPayload::KnownPayload(const ControllerConfig& config)
       period_(config.period),
       payload_(config.payload),
       carried_(ves::carried(config.payload)),
-      before_(carried_) {}
+      before_(carried_),
+      switched_(config.hand.switched) {}
 
 void KnownPayload::update(const Elapsed& elapsed, std::int32_t commanded) noexcept {
   changed_ = learnt_ = learns_;
@@ -38,6 +39,13 @@ void KnownPayload::update(const Elapsed& elapsed, std::int32_t commanded) noexce
     learnt_ = false;  // its weight is new, and not what was carried all along
   }
   if (changed_) take();
+}
+
+void KnownPayload::readGripper(std::uint32_t switches) noexcept {
+  if (!switched_) return;
+  const bool closed = switches & kGripperClosed;
+  if (gripper_closed_ && closed != *gripper_closed_) gripper_moves_ = true;
+  gripper_closed_ = closed;
 }
 
 void KnownPayload::learn(const RobotModel& robot) noexcept {

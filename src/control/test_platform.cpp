@@ -32,6 +32,7 @@ const TickState& TestPlatform::tick(const TickInput& in) noexcept {
   const Sample& sample = samples_.sample();
   const Transform& X_IP = legs_.update(samples_, elapsed, following, commander_).X_IP;  // (2.23)
 
+  if (samples_.fresh()) known_.readGripper(sample.switches);
   known_.update(elapsed, commander_.command().segment);
   if (!engaged) joints_.reset(sample.q);
   load_.update(known_, joints_.at(sample), X_IP.R, samples_.wrench().since, engaged,

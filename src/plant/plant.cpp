@@ -393,6 +393,8 @@ Sample Plant::sample() noexcept {
   s.joints_time = joints_time_;
   s.q = joints_read_;
   s.switches = kAllSwitchesClosed;
+  if (config_.gripper_switch && (robot_.holds() || truth_.target.X_TB))
+    s.switches |= kGripperClosed;
   for (std::size_t i = 0; i < config_.faults.size(); ++i) {
     const FaultEvent& event = config_.faults[i];
     injectors_[i].apply(event, now(event.cue, event.duration), config_.sensor.volts_per_count, s);

@@ -23,8 +23,10 @@ using LegCounts = std::array<std::int32_t, kLegs>;
 inline constexpr std::int32_t kMaxLegCount = (1 << 14) - 1;  // [count] of a Temposonics
 
 /// Safety loops, closed while the switches are not pressed: a broken wire reads as pressed.
-enum Switch : std::uint32_t { kPanicButtonClosed = 1u, kFloorMatClosed = 2u };
+/// And the gripper's, which is no safety loop: it only tells.
+enum Switch : std::uint32_t { kPanicButtonClosed = 1u, kFloorMatClosed = 2u, kGripperClosed = 4u };
 inline constexpr std::uint32_t kAllSwitchesClosed = kPanicButtonClosed | kFloorMatClosed;
+inline constexpr std::uint32_t kAllSwitches = kAllSwitchesClosed | kGripperClosed;
 
 /// Pieces of the machine that can say of themselves that they are at fault.
 enum Piece : std::uint32_t { kLegsPiece = 1u, kSensorPiece = 2u, kRobotPiece = 4u };

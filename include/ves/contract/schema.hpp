@@ -70,7 +70,7 @@ constexpr auto fields(S& s) {
             "six wrench channels in {S} order Fx Fy Fz Mx My Mz, then pressure", kNumbers},
       Field{"legs", "count", s.legs, "Temposonics, 0 to 16383", kLegs},
       Field{"switches", "-", s.switches,
-            "bit 0 panic button loop closed, bit 1 floor mat loop closed"},
+            "bit 0 panic button loop closed, bit 1 floor mat loop closed, bit 2 gripper closed"},
       Field{"q", "rad | m", s.q, "robot joints, base to tip; unused ones 0", kJoints},
       Field{"temperature", "C", s.temperature,
             "of the laboratory, by a thermometer beside the sensor"},

@@ -22,6 +22,8 @@ class KnownPayload {
   void learn(const RobotModel& robot) noexcept;
   /// The gripper has closed or opened, from the next tick on.
   void moveGripper() noexcept { gripper_moves_ = true; }
+  /// The gripper's switch of a new sample, where it has one: a change tells of this tick.
+  void readGripper(std::uint32_t switches) noexcept;
 
   const Payload& payload() const noexcept { return payload_; }
   /// All of it, counted into the robot's links.
@@ -46,6 +48,8 @@ class KnownPayload {
   std::array<bool, kMaxToldLoads> done_{};
   bool changed_ = false, learnt_ = false, learns_ = false;
   bool gripper_moved_ = false, gripper_moves_ = false;
+  bool switched_;                       // it has a switch,
+  std::optional<bool> gripper_closed_;  // which was last
 };
 
 /// The weight of everything the sensor carries.

@@ -62,6 +62,7 @@ struct PlantConfig {
   std::int64_t sensor_window = 0;  // [ns] and over which; 1: read when asked
   Climate climate;
   JointEncoderModel joints;
+  bool gripper_switch = false;       // closed while the robot holds something
   Payload payload;                   // as it is
   Vec3 gravity = {0.0, 0.0, -9.81};  // [m/s^2] g_I
   RobotTask task;

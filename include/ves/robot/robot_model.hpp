@@ -120,6 +120,7 @@ RigidBody compositeBody(const RobotModel& robot, const JointVector& q) noexcept;
 struct Hand {
   int link = -2;               // [-] that carries it; -1: link 0, -2: there is none
   Vec3 p_LT_L = Vec3::Zero();  // [m] in that link's frame
+  bool switched = false;       // a switch tells whether it is closed
 };
 
 /// The robot with a further body on a link (-1: link 0), rigid, in that link's frame.
