@@ -6,6 +6,10 @@
 //       masses, centres of mass and tau off by up to 10 %, samples 0 to 3 ticks late, read and
 //       commanded up to 2 ms before and after their ticks; a third of them in space, on Earth, and
 //       on Earth with masses and centres that are known, as after an identification
+//   random_machines masses N [SEED [SET...]]      DOSS and PUMA on four bases, aided, noise on:
+//   every
+//       body's mass and centre off by up to 10 %, by its own draw and a common one; masses as
+//       believed at first, learnt, and learnt with a tilt after the calibration
 //   random_machines late N [SEED [SET...]]        the same machine as believed, N ticks late
 //   random_machines gate N [SEED [SET...]]        a PUMA on bases near the limit of stability, off
 //       by what the gate allows for: what it admits beside what then grows
@@ -19,6 +23,7 @@
 #include <map>
 
 #include "machines.hpp"
+#include "support/misbelief.hpp"
 #include "support/rig.hpp"
 #include "ves/analysis/gate.hpp"
 #include "ves/evaluation/comparison.hpp"
@@ -111,6 +116,74 @@ int late(int ticks, unsigned seed, const Sets& set) {
                    ? fmt::format("{:.2f} %", 100.0 * offOf(ended))
                    : fmt::format("{} by {}", name(ended.phase), name(ended.cause)));
   }
+  return 0;
+}
+
+/// [-] of travel, rms, in position and rotation.
+struct Off {
+  std::vector<double> position, rotation;
+  int refused = 0;  // [-] by the calibration, or stopped
+};
+
+Off masses(const std::string& scenario, const char* joint, int to, int draws, unsigned seed,
+           const Sets& set, bool wrong, bool tilt) {
+  Off out;
+  out.position.assign(static_cast<std::size_t>(draws), NAN);
+  out.rotation = out.position;
+  forEach(draws, [&](int i) {
+    const unsigned own = seed + static_cast<unsigned>(i);
+    Experiment e = test::experiment(
+        scenario,
+        with(with(kCompensated,
+                  {"sensor.noise=true", "sensor.readings_per_tick=4", "base.keep_modes=6",
+                   "controller.compensation.wrench=aided", fmt::format("seed={}", own),
+                   fmt::format("program=[{{move: {{}}}}, {{calibration: {{}}}}, {}{{admittance: "
+                               "{{duration_s: 20}}, robot: [{{at_s: 0, duration_s: 5, joint: {}, "
+                               "to_deg_or_m: {}}}]}}]",
+                               tilt ? "{excite: {tilt_deg: 4, duration_s: 9}}, " : "", joint, to)}),
+             set));
+    std::mt19937 random(own);
+    if (wrong) test::misbelieve(e.controller.payload, random);
+    const Ended ended = run(e, 0, 0, own);
+    if (ended.phase != Phase::kParked || !ended.begun) return;
+    const auto found = emulation(ended.series);
+    const Distance off = distance(found->platform, found->base);
+    const Distance all = travel(found->base);
+    out.position[static_cast<std::size_t>(i)] = off.rms_position / all.peak_position;
+    out.rotation[static_cast<std::size_t>(i)] = off.rms_attitude / all.peak_attitude;
+  });
+  for (std::vector<double>* values : {&out.position, &out.rotation})
+    std::erase_if(*values, [](double v) { return !std::isfinite(v); });
+  out.refused = draws - static_cast<int>(out.position.size());
+  return out;
+}
+
+int allMasses(int draws, unsigned seed, const Sets& set) {
+  fmt::print("median, worst of position and rotation [% of travel, rms]\n");
+  const auto cells = [](const Off& off) {
+    std::string out;
+    for (const std::vector<double>* values : {&off.position, &off.rotation})
+      out += fmt::format("{}{:.2f}, {:.2f}", out.empty() ? "" : " / ", 100.0 * at(*values, 0.5),
+                         100.0 * at(*values, 1.0));
+    return out + (off.refused > 0 ? fmt::format(" ({} refused)", off.refused) : "");
+  };
+  for (const auto& [robot, joint, to] :
+       {std::tuple{"doss", "joint_3", -60}, std::tuple{"puma", "joint_1", 30}})
+    for (const char* arm : kArms)
+      for (const char* gravity : {"0", "9.81"}) {
+        const std::string scenario = fmt::format("srms_{}_{}", arm, robot);
+        const Sets here = with(set, {std::string("gravity_m_per_s2=") + gravity}),
+                   learns = with(here, {"controller.compensation.mass_error=0.1",
+                                        "controller.compensation.learns_masses=true"});
+        const auto off = [&](const Sets& sets, int n, bool wrong, bool tilt) {
+          return cells(masses(scenario, joint, to, n, seed, sets, wrong, tilt));
+        };
+        constexpr int kExact = 2;  // [-] seeds of the noise, which it keeps out
+        fmt::print("{} {} m/s^2: exact {}; off {}; learnt {}; with tilt {}\n", scenario, gravity,
+                   off(here, std::min(draws, kExact), false, false), off(here, draws, true, false),
+                   off(learns, draws, true, false), off(learns, draws, true, true));
+        std::fflush(stdout);
+      }
   return 0;
 }
 
@@ -246,15 +319,17 @@ int gates(int n, unsigned seed, const Sets& set) {
 
 int main(int argc, char** argv) {
   const std::string what = argc > 2 ? argv[1] : "";
-  if (what != "emulation" && what != "gate" && what != "late") {
+  if (what != "emulation" && what != "gate" && what != "late" && what != "masses") {
     fmt::print(stderr,
-               "random_machines: want emulation, gate or late, a number, then seed and settings\n");
+               "random_machines: want emulation, masses, gate or late, a number, then seed and "
+               "settings\n");
     return 2;
   }
   try {
     const int n = std::stoi(argv[2]);
     const auto seed = static_cast<unsigned>(argc > 3 ? std::stoi(argv[3]) : 1);
     const ves::Sets set(argv + std::min(4, argc), argv + argc);
+    if (what == "masses") return ves::allMasses(n, seed, set);
     if (what == "late") return ves::late(n, seed, set);
     return what == "gate" ? ves::gates(n, seed, set) : ves::emulations(n, seed, set);
   } catch (const std::exception& error) {
