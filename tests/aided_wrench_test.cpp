@@ -201,9 +201,9 @@ TEST(JointMomentum, AnglesThatAreOlderBeginAnew) {
   }
 }
 
-// A reading that is older than its sample goes on as fast as of late, wherever inertia is
-// compensated.
-TEST(JointMomentum, CarriesReadingsThatAreOldOnToTheirSample) {
+// A reading that is older or younger than the wrench is carried there, as fast as of late, wherever
+// inertia is compensated.
+TEST(JointMomentum, CarriesReadingsToTheTimeOfTheWrench) {
   for (const bool compensated : {false, true}) {
     ControllerConfig c = pendulum(config());
     c.compensation.inertia = compensated;
@@ -218,8 +218,14 @@ TEST(JointMomentum, CarriesReadingsThatAreOldOnToTheirSample) {
       if (k > 3) EXPECT_NEAR(joints.at(s)(0), compensated ? now : s.q(0), 1e-12) << k;
       joints.update(known, s, Mat3::Identity(), 1e-2);
     }
-    s.joints_time = s.time;  // as old as the sample: the reading
+    s.joints_time = s.wrench_time;  // as old as the wrench: the reading
     EXPECT_EQ(joints.at(s), s.q);
+    // A wrench that is a mean over a window that ended before is older.
+    s.joints_time = s.time + kTick;
+    s.wrench_time = s.joints_time - 8'000'000;
+    s.q(0) = 0.3 + 0.4e-9 * static_cast<double>(s.joints_time);
+    const double then = 0.3 + 0.4e-9 * static_cast<double>(s.wrench_time);
+    EXPECT_NEAR(joints.at(s)(0), compensated ? then : s.q(0), 1e-12);
   }
 }
 

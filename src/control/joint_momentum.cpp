@@ -65,8 +65,8 @@ void JointMomentum::reset(const JointVector& q) noexcept {
 }
 
 JointVector JointMomentum::at(const Sample& sample) const noexcept {
-  const double since = seconds(sample.joints_time, sample.time);
-  if (!compensated_ || known_ == 0 || !(since > 0.0)) return sample.q;
+  const double since = seconds(sample.joints_time, sample.wrench_time - delay_);
+  if (!compensated_ || known_ == 0 || since == 0.0) return sample.q;
   const Angles& newest = last_[2];
   const bool fresh = sample.joints_time > newest.time;
   if (!fresh && known_ == 1) return sample.q;

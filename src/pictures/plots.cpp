@@ -308,10 +308,10 @@ std::vector<std::filesystem::path> drawPlots(const Series& series,
               program, 1, 2);
     std::vector<Curve> links, hand;
     for (std::size_t k = 0; k < bodies.size(); ++k) {
-      const auto& [name, believed] = bodies[k];
-      const auto mass = column(name + "_learnt_mass_kg"),
-                 deviation = column(name + "_learnt_mass_deviation_kg");
-      if (name == "hand") {
+      const auto& [body, believed] = bodies[k];
+      const auto mass = column(body + "_learnt_mass_kg"),
+                 deviation = column(body + "_learnt_mass_deviation_kg");
+      if (body == "hand") {
         hand = {{mass, "in hand", kColour[0], false}};
         for (const double sign : {-1.0, 1.0})
           hand.push_back({[=](const Row& row) { return mass(row) + sign * deviation(row); },
@@ -320,7 +320,7 @@ std::vector<std::filesystem::path> drawPlots(const Series& series,
         links.push_back({[mass, off = believed](const Row& row) {
                            return mass(row) > 0.0 ? mass(row) - off : NAN;  // learnt yet
                          },
-                         name.substr(name.find('_') + 1), kColour[k % 3], k >= 3});
+                         body.substr(body.find('_') + 1), kColour[k % 3], k >= 3});
       }
     }
     page.panel("masses of links beyond belief [kg]", links);
