@@ -215,7 +215,9 @@ TEST(JointMomentum, CarriesReadingsToTheTimeOfTheWrench) {
       s.joints_time = (k * kTick) / 13'000'000 * 13'000'000;  // every 13 ms
       s.q(0) = 0.3 + 0.4e-9 * static_cast<double>(s.joints_time);
       const double now = 0.3 + 0.4e-9 * static_cast<double>(s.time);
-      if (k > 3) EXPECT_NEAR(joints.at(s)(0), compensated ? now : s.q(0), 1e-12) << k;
+      if (k > 3) {
+        EXPECT_NEAR(joints.at(s)(0), compensated ? now : s.q(0), 1e-12) << k;
+      }
       joints.update(known, s, Mat3::Identity(), 1e-2);
     }
     s.joints_time = s.wrench_time;  // as old as the wrench: the reading

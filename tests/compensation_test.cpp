@@ -322,9 +322,9 @@ TEST_F(Emulation, MassesThatAreTenPercentOffAreLearnt) {
 TEST_F(Emulation, JointsThatAreReadToCountsAndSeldomCostLittle) {
   for (const auto& [encoders, most] :
        {std::tuple{"{rate_hz: 77}", 0.002}, std::tuple{"{rate_hz: 125}", 0.002},
-        std::tuple{"{counts_per_turn_or_m: 65536}", 0.003},
-        std::tuple{"{counts_per_turn_or_m: 65536, rate_hz: 77}", 0.02},
-        std::tuple{"{counts_per_turn_or_m: 4096, noise_deg_or_m: 0.01}", 0.04}}) {
+        std::tuple{"{counts_per_turn: 65536}", 0.003},
+        std::tuple{"{counts_per_turn: 65536, rate_hz: 77}", 0.02},
+        std::tuple{"{counts_per_turn: 4096, noise_deg_or_m: 0.01}", 0.04}}) {
     const Experiment e =
         experiment("srms_capture_doss", with(kCompensated, kAidedWrench),
                    with({"base.keep_modes=6", fmt::format("robot.encoders={}", encoders)}, kMean));
@@ -333,8 +333,9 @@ TEST_F(Emulation, JointsThatAreReadToCountsAndSeldomCostLittle) {
     EXPECT_LT(share(e, series), most) << encoders;
     for (const Row& row : series.rows)
       if (row.state.kind == static_cast<int>(SegmentKind::kAdmittance) &&
-          row.state.phase == static_cast<int>(Phase::kRunning))
+          row.state.phase == static_cast<int>(Phase::kRunning)) {
         ASSERT_TRUE(row.state.withholds) << encoders << " " << row.t;
+      }
   }
 }
 

@@ -387,10 +387,11 @@ TEST(Plant, EncodersAreReadAtTheirRate) {
     plant.advance(k * 10'000'000LL);
     const Sample s = plant.sample();
     EXPECT_EQ(s.joints_time, s.time / e.plant.joints.interval * e.plant.joints.interval) << k;
-    if (s.joints_time == last)
+    if (s.joints_time == last) {
       EXPECT_EQ(s.q, before);
-    else if (k > 20)
+    } else if (k > 20) {
       EXPECT_NE(s.q, before);
+    }
     before = s.q;
     last = s.joints_time;
   }

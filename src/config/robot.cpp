@@ -126,7 +126,7 @@ static JointVector ofJoints(Section& s, std::string_view key, int joints, double
 
 static plant::JointEncoderModel readEncoders(Section s, const RobotModel& robot) {
   plant::JointEncoderModel out;
-  constexpr const char* kCounts = "counts_per_turn_or_m";
+  constexpr const char* kCounts = "counts_per_turn";
   const JointVector counts = ofJoints(s, kCounts, robot.joints, 10.0, 1e10);
   out.play = ofJoints(s, "play_deg_or_m", robot.joints, 0.0, 10.0);
   out.noise = ofJoints(s, "noise_deg_or_m", robot.joints, 0.0, 10.0);
