@@ -65,14 +65,10 @@ void JointMomentum::reset(const JointVector& q) noexcept {
 }
 
 JointVector JointMomentum::at(const Sample& sample) const noexcept {
-  const double since = seconds(sample.joints_time, sample.wrench_time - delay_);
-  if (!compensated_ || known_ == 0 || since == 0.0) return sample.q;
-  const Angles& newest = last_[2];
-  const bool fresh = sample.joints_time > newest.time;
-  if (!fresh && known_ == 1) return sample.q;
-  const Angles& before = fresh ? newest : last_[1];
-  const JointVector rate = (sample.q - before.q) / seconds(before.time, sample.joints_time);
-  return sample.q + since * rate;
+  const std::int64_t time = sample.wrench_time - delay_;
+  if (!compensated_ || known_ < 3 || sample.joints_time == time) return sample.q;
+  const double since = seconds(last_[1].time, time);
+  return middle_ + since * q_dot_ + 0.5 * since * since * q_ddot_;
 }
 
 void JointMomentum::update(const KnownPayload& known, const Sample& sample, const Mat3& R_IP,

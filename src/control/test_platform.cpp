@@ -35,6 +35,7 @@ const TickState& TestPlatform::tick(const TickInput& in) noexcept {
   if (samples_.fresh()) known_.readGripper(sample.switches);
   known_.update(elapsed, commander_.command().segment);
   if (!engaged) joints_.reset(sample.q);
+  joints_.update(known_, sample, X_IP.R, engaged ? samples_.wrench().since : 0.0);
   load_.update(known_, joints_.at(sample), X_IP.R, samples_.wrench().since, engaged,
                share_.value());
   bias_.stepTare(sample, samples_.fresh(), load_.counts());
@@ -43,7 +44,6 @@ const TickState& TestPlatform::tick(const TickInput& in) noexcept {
   Wrenches W;
   W.total = forceMeasurement(config_.sensor, bias_.counts(), sample.adc, X_IP.R);  // (C.1)
   W.static_wrench = gravityCompensation(config_.payload, X_IP.R, load_.wrench());  // (B.4)
-  joints_.update(known_, sample, X_IP.R, engaged ? samples_.wrench().since : 0.0);
   W.inertial = robot_.update(known_, elapsed.count, joints_.q(), samples_.wrench().since, X_IP,
                              legs_.feltMotion(), engaged, share_.value());
   const Wrench measured = W.total - W.static_wrench + W.inertial;

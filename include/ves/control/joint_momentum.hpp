@@ -33,8 +33,9 @@ class JointMomentum {
   void update(const KnownPayload& known, const Sample& sample, const Mat3& R_IP,
               double since) noexcept;
 
-  /// [rad | m] Where the joints were at the time of the sample's wrench, if they were read at
-  /// another: they go as fast as of late. The reading itself where no inertia is compensated.
+  /// [rad | m] Where the joints were at the time of the sample's wrench, by the parabola of the
+  /// last update(); the reading itself if that is of this time, and where no inertia is
+  /// compensated.
   JointVector at(const Sample& sample) const noexcept;
   const JointVector& q() const noexcept { return q_; }  // [rad | m] as the wrench shows them
   const JointVector& q_dot() const noexcept { return shown_q_dot_; }  // [rad/s | m/s] the same
