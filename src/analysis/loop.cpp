@@ -157,14 +157,10 @@ bool decays(const Loop& loop, const Lifted& lifted) {
 
 }  // namespace
 
-RigidBody lockedRobot(const Belief& belief, const JointVector& q) {
-  return combine(RigidBody{}, belief.payload.X_PL0(), compositeBody(carried(belief.payload), q));
-}
-
 Loop loopOf(const ControllerConfig& controller, const JointVector& q, Direction direction) {
   Loop loop;
   loop.base = controller.admittance;
-  loop.robot_P = lockedRobot(controller, q);
+  loop.robot_P = lockedRobot(controller.payload, q);
   loop.period = static_cast<double>(controller.period) * kSecondPerNanosecond;
   Loop::Model& own = loop.model;
   own = {controller.compensation.feed_forward, controller.compensation.inertia, loop.robot_P,

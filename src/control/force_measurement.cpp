@@ -77,9 +77,9 @@ double filteredCorrelation(const ServoModel& servo, double period) {
   };
   const int n = servo.sensor_readings;
   const auto ofSamples = [&](double apart) {
-    double sum = 0.0;
-    for (int i = 0; i < n; ++i)
-      for (int j = 0; j < n; ++j) sum += behind(apart + (i - j) * servo.sensor_window / n);
+    double sum = 0.0;  // over pairs of readings, by how many lie between them
+    for (int d = 1 - n; d < n; ++d)
+      sum += (n - std::abs(d)) * behind(apart + d * servo.sensor_window / n);
     return sum;
   };
   constexpr double kForgotten = 20.0;  // [-] times 1/a

@@ -269,8 +269,7 @@ Distance travel(const Motion& motion) {
 
 std::vector<CoupledMode> coupledModes(const Interaction& interaction) {
   const ModalModel& base = interaction.base;
-  const RigidBody robot = combine(RigidBody{}, interaction.payload.X_PL0(),
-                                  compositeBody(carried(interaction.payload), interaction.q0));
+  const RigidBody robot = lockedRobot(interaction.payload, interaction.q0);
   const Eigen::MatrixXd A = augmentedModalMass(base, robot);
   const Eigenmodes modes = eigenmodes(A, base.stiffness.asDiagonal());
   // xi = V^T A eta, eta = Phi^+ x

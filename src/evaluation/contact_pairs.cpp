@@ -57,10 +57,7 @@ namespace {
 double energy(const Experiment& e, const Vec6& x, const Vec6& x_dot, const JointVector& q,
               const Floating& floating) {
   const ModalModel& base = e.controller.admittance;
-  const Payload& payload = e.plant.payload;
-  const RigidBody robot_P =
-      combine(RigidBody{}, payload.X_PL0(), compositeBody(carried(payload), q));
-  const Mat6 M_1 = spatialMass(rotated(rotation(x.tail<3>()), robot_P));
+  const Mat6 M_1 = spatialMass(rotated(rotation(x.tail<3>()), lockedRobot(e.plant.payload, q)));
   const Eigen::VectorXd eta = leastSquares(base.Phi, x), eta_dot = leastSquares(base.Phi, x_dot);
   double twice =
       eta_dot.squaredNorm() + eta.dot(base.stiffness.cwiseProduct(eta)) + x_dot.dot(M_1 * x_dot);
@@ -74,49 +71,58 @@ double energy(const Experiment& e, const Vec6& x, const Vec6& x_dot, const Joint
   return 0.5 * twice;
 }
 
-/// [J] by tick of the segment: in the run, and in free space with the joints where they were in it.
-struct Energies {
-  std::vector<double> t, emulated, free_space;  // [s], [J], [J]
-};
-Energies energies(const Series& series, const Motion& base) {
-  std::vector<double> t;
-  std::vector<const truth_t*> rows;
-  eachTick(series, [&](const Row& row, double since) {
-    if (!row.hasTruePose()) return;
-    t.push_back(since);
-    rows.push_back(&row.truth);
-  });
-  Energies out;
-  for (std::size_t i = 1; i + 1 < std::min(rows.size(), base.target.size()); ++i) {
-    // Over a tick before and after: within one a platform's speed swings.
-    const double time = t[i + 1] - t[i - 1];
-    const auto place = [&](std::size_t k) { return Vec6::Map(rows[k]->x); };
-    const Vec6 x_dot = (place(i + 1) - place(i - 1)) / time,
-               due_dot = (base.x[i + 1] - base.x[i - 1]) / (base.t[i + 1] - base.t[i - 1]);
-    const JointVector q = JointVector::Map(rows[i]->q);
-    Floating floating;
-    floating.p = Vec3::Map(rows[i]->target_p);
-    floating.q.coeffs() = Eigen::Vector4d::Map(rows[i]->target_q);
-    floating.v = Vec3::Map(rows[i]->target_v);
-    floating.w = Vec3::Map(rows[i]->target_w);
-    out.t.push_back(t[i]);
-    out.emulated.push_back(energy(series.experiment, place(i), x_dot, q, floating));
-    out.free_space.push_back(energy(series.experiment, base.x[i], due_dot, q, base.target[i]));
+/// The ticks of the first admittance segment with the true pose, and the same times in free space.
+class Ticks {
+ public:
+  Ticks(const Series& series, const Motion& base) : experiment_(series.experiment), base_(base) {
+    eachTick(series, [&](const Row& row, double since) {
+      if (!row.hasTruePose()) return;
+      t_.push_back(since);
+      rows_.push_back(&row.truth);
+    });
+    size_ = std::min(rows_.size(), base.target.size());
   }
-  return out;
-}
 
-/// [J] gained from before `contact` until ContactPair::kAfter later, or until `next` [s].
-double gained(const std::vector<double>& t, const std::vector<double>& energy,
-              const Contact& contact, double next) {
-  const double end = contact.began + contact.duration;
-  const auto after =
-      std::upper_bound(t.begin(), t.end(), std::min(end + ContactPair::kAfter, next));
-  const auto before = std::upper_bound(t.begin(), t.end(), contact.began);
-  if (before - t.begin() < 2 || after == t.begin() || *(after - 1) <= end) return NAN;
-  return energy[static_cast<std::size_t>(after - 1 - t.begin())] -
-         energy[static_cast<std::size_t>(before - 2 - t.begin())];
-}
+  using Energy = double (Ticks::*)(std::size_t) const;  // [J] in a tick that has two neighbours
+  double emulated(std::size_t i) const {
+    const truth_t& m = *rows_[i];
+    Floating floating;
+    floating.p = Vec3::Map(m.target_p);
+    floating.q.coeffs() = Eigen::Vector4d::Map(m.target_q);
+    floating.v = Vec3::Map(m.target_v);
+    floating.w = Vec3::Map(m.target_w);
+    const auto x = [&](std::size_t k) { return Vec6::Map(rows_[k]->x); };
+    return energy(experiment_, x(i), (x(i + 1) - x(i - 1)) / (t_[i + 1] - t_[i - 1]), q(i),
+                  floating);
+  }
+  /// With the joints where they were in the run.
+  double freeSpace(std::size_t i) const {
+    const Vec6 x_dot = (base_.x[i + 1] - base_.x[i - 1]) / (base_.t[i + 1] - base_.t[i - 1]);
+    return energy(experiment_, base_.x[i], x_dot, q(i), base_.target[i]);
+  }
+
+  /// [J] gained from before `contact` until ContactPair::kAfter later, or until `next` [s].
+  double gained(Energy energy, const Contact& contact, double next) const {
+    const double end = contact.began + contact.duration;
+    const std::size_t after = ticksUntil(std::min(end + ContactPair::kAfter, next)),
+                      before = ticksUntil(contact.began);
+    // Over a tick before and after: within one a platform's speed swings.
+    if (before < 3 || after < 2 || after + 1 > size_ || !(t_[after - 1] > end)) return NAN;
+    return (this->*energy)(after - 1) - (this->*energy)(before - 2);
+  }
+
+ private:
+  JointVector q(std::size_t i) const { return JointVector::Map(rows_[i]->q); }
+  std::size_t ticksUntil(double t) const {
+    return static_cast<std::size_t>(std::upper_bound(t_.begin(), t_.end(), t) - t_.begin());
+  }
+
+  const Experiment& experiment_;
+  const Motion& base_;
+  std::vector<double> t_;  // [s]
+  std::vector<const truth_t*> rows_;
+  std::size_t size_ = 0;
+};
 
 }  // namespace
 
@@ -127,7 +133,7 @@ std::vector<ContactPair> contactPairs(const Series& series, const std::optional<
   for (std::size_t i = 0; i < emulated.size(); ++i) out[i].emulated = emulated[i];
   for (std::size_t i = 0; i < free_space.size(); ++i) out[i].free_space = free_space[i];
   if (out.empty() || !e) return out;
-  const Energies known = energies(series, e->base);
+  const Ticks ticks(series, e->base);
   const auto next = [](const std::vector<Contact>& all, std::size_t i) {
     return i + 1 < all.size() ? all[i + 1].began : HUGE_VAL;
   };
@@ -137,8 +143,8 @@ std::vector<ContactPair> contactPairs(const Series& series, const std::optional<
     // Newton: the impulse is what mass meets, times the speeds' sum.
     const double mass = due.impulse.norm() / (due.approach + due.separation),
                  approach = 0.5 * mass * due.approach * due.approach;
-    out[i].energy_error = (gained(known.t, known.emulated, ours, next(emulated, i)) -
-                           gained(known.t, known.free_space, due, next(free_space, i))) /
+    out[i].energy_error = (ticks.gained(&Ticks::emulated, ours, next(emulated, i)) -
+                           ticks.gained(&Ticks::freeSpace, due, next(free_space, i))) /
                           approach;
   }
   return out;

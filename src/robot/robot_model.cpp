@@ -66,6 +66,10 @@ RobotModel carried(const Payload& payload) noexcept {
   return all;
 }
 
+RigidBody lockedRobot(const Payload& payload, const JointVector& q) noexcept {
+  return combine(RigidBody{}, payload.X_PL0(), compositeBody(carried(payload), q));
+}
+
 RobotModel withLoad(RobotModel robot, int link, const RigidBody& load) noexcept {
   RigidBody& carrier = robot.bodyOf(link);
   if (load.mass > 0.0) carrier = combine(carrier, {}, load);

@@ -89,7 +89,7 @@ struct Books {
 
   explicit Books(const Experiment& experiment)
       : e(experiment),
-        M_1(spatialMass(lockedRobot(e.controller, e.plant.task.initial_joints))),
+        M_1(spatialMass(lockedRobot(e.controller.payload, e.plant.task.initial_joints))),
         inverse(leastSquares(e.controller.admittance.Phi, Mat6::Identity())) {}
   double operator()(const Vec6& x, const Vec6& x_dot, const Floating& target) const {
     const ModalModel& base = e.controller.admittance;

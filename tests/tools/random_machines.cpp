@@ -7,8 +7,7 @@
 //       commanded up to 2 ms before and after their ticks; a third of them in space, on Earth, and
 //       on Earth with masses and centres that are known, as after an identification
 //   random_machines masses N [SEED [SET...]]      DOSS and PUMA on four bases, aided, noise on:
-//   every
-//       body's mass and centre off by up to 10 %, by its own draw and a common one; masses as
+//       every body's mass and centre off by up to 10 %, by its own draw and a common one; masses as
 //       believed at first, learnt, and learnt with a tilt after the calibration
 //   random_machines late N [SEED [SET...]]        the same machine as believed, N ticks late
 //   random_machines gate N [SEED [SET...]]        a PUMA on bases near the limit of stability, off

@@ -81,9 +81,6 @@ Loop off(Loop loop, const Uncertainty& by, int timing, int gain);
 /// long as its speed is nearly a sine.
 enum class Direction { kExtending, kRetracting, kSwinging };
 
-/// The robot as the controller believes it, its joints locked at q.
-RigidBody lockedRobot(const Belief& belief, const JointVector& q);
-
 /// The loop as the controller believes it: servos and sensor by its servo model, the robot by its
 /// payload, the joints at q.
 Loop loopOf(const ControllerConfig& controller, const JointVector& q, Direction direction);

@@ -60,9 +60,9 @@ class AidedWrench {
   explicit AidedWrench(const ControllerConfig& config);
 
   struct Input {
-    const Wrench& measured;  // F_Po_I that the sensor shows beyond weight and inertia
-    const Wrench& weight;    // F_Po_I
-    const RobotModel& carried;
+    const Wrench& measured;     // F_Po_I that the sensor shows beyond weight and inertia
+    const Wrench& weight;       // F_Po_I
+    const RobotModel& carried;  // whose joints' momentum counts
     const RobotInertia& robot;
     const JointMomentum& joints;
     const SampleStream& samples;

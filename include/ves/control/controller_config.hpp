@@ -88,9 +88,9 @@ struct JointSensors {
 struct Belief {
   Geometry geometry;
   ForceSensor sensor;
-  Vec6 bias = Vec6::Zero();  // [count] until a calibration replaces it
-  Payload payload;           // what the sensor carries,
-  JointSensors joints;
+  Vec6 bias = Vec6::Zero();          // [count] until a calibration replaces it
+  Payload payload;                   // what the sensor carries,
+  JointSensors joints;               // whose angles are known so well,
   Hand hand;                         // where the robot holds things,
   ToldLoads told_loads;              // and what it takes in hand
   Vec3 gravity = {0.0, 0.0, -9.81};  // [m/s^2] g_I

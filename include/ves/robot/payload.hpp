@@ -23,5 +23,7 @@ struct Payload {
 
 /// The robot with the sensor's top plate and the adapter plate counted into its link 0.
 RobotModel carried(const Payload& payload) noexcept;
+/// All of it as one body in the platform's frame, its joints locked at q.
+RigidBody lockedRobot(const Payload& payload, const JointVector& q) noexcept;
 
 }  // namespace ves
