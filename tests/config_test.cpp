@@ -121,6 +121,7 @@ TEST(Config, EveryMachineNumberIsTheReportsOrTagged) {
                                         "wrench",
                                         "learns_masses",
                                         "filters",
+                                        "model",
                                         "dead_band_n_or_nm",
                                         "low_pass_hz",
                                         "legs",
@@ -611,6 +612,27 @@ TEST(Config, AnExcitationIsFiveMoves) {
 }
 
 // Of more moves than a program holds, none is lost in silence.
+TEST(Config, HydraulicLegsThatCannotBeAreRefused) {
+  const auto said = [](std::vector<std::string> set) {
+    set.push_back("legs.model=hydraulic");
+    return refusal([&] { loadExperiment(scenarios() / "z_sine.yaml", set); });
+  };
+  EXPECT_EQ(said({}), "");
+  const std::pair<std::vector<std::string>, std::string> bad[] = {
+      {{"legs.filters=outputs"}, "legs.filters: are of ideal legs, want none"},
+      {{"machine.legs=external"}, "legs.model: is hydraulic, want ideal"},
+      {{"legs.hydraulic.supply_mpa=0.1"}, "legs.hydraulic: no areas give the leg's two gains"},
+      {{"legs.hydraulic.gains_at_ma=1", "legs.hydraulic.valve_opening_ma=-2"},
+       "legs.hydraulic.gains_at_ma: is within the valve's overlap"},
+      {{"legs.hydraulic.breakaway_n=100"},
+       "legs.hydraulic.breakaway_n: '100', want a number in [150,"},
+      {{"legs.hydraulic=three_way"}, "legs.hydraulic"}};
+  for (const auto& [set, part] : bad) {
+    EXPECT_NE(said(set).find(part), std::string::npos) << said(set);
+    EXPECT_EQ(said(set).find('\n'), std::string::npos) << said(set);
+  }
+}
+
 TEST(Config, ExcitationsThatFillAProgramAreRefused) {
   std::string program;
   for (int i = 0; i < 13; ++i)

@@ -32,7 +32,7 @@ class NoHeap : public testing::TestWithParam<const char*> {};
 
 TEST_P(NoHeap, FromArmingToParking) {
   for (const char* base :
-       {"seed=1", kCompensated, "sensor.readings_per_tick=4",
+       {"seed=1", kCompensated, "sensor.readings_per_tick=4", "legs.model=hydraulic",
         "base={mass_diagonal: [500,500,500,250,250,250], damping_diagonal: "
         "[500,400,300,200,100,90], stiffness_diagonal: [1500,2500,4000,1500,1000,2000]}"}) {
     const Experiment e = experiment(GetParam(), {base});

@@ -204,6 +204,7 @@ Experiment build(const Value& document, AskedKey* asked = nullptr) {
   p.transducer = legs.transducer;
   p.filters = legs.filters;
   p.filter_cutoff = legs.filter_cutoff;
+  p.hydraulic = legs.hydraulic;
   p.sensor = sensor.model;
   p.climate = sensor.climate;
   p.payload = c.payload;
@@ -214,6 +215,15 @@ Experiment build(const Value& document, AskedKey* asked = nullptr) {
     if (root.has(key)) readPlantMismatch(root.section(key), p);
   if (root.has("reality"))
     out.source.warnings.push_back("'reality' is called 'plant_mismatch' now; the old name will go");
+  if (p.hydraulic) {
+    if (out.machine.external_legs)
+      root.section("legs").fail("model", "is hydraulic, want ideal: the legs are external");
+    if (!fit(*p.hydraulic, p.actuator, p.geometry))
+      root.section("legs").fail(
+          "hydraulic",
+          "no areas give the leg's two gains under the plate's weight, want more "
+          "supply_mpa or bore_area_cm2, or gains farther apart");
+  }
   const Vec6 L = legLengths(p.geometry, p.geometry.fromHome(p.initial_pose));
   for (int i = 0; i < kLegs; ++i)
     if (!(L(i) >= p.actuator.length_min && L(i) <= p.actuator.length_max))
@@ -267,6 +277,9 @@ Experiment build(const Value& document, AskedKey* asked = nullptr) {
   root.finish();
   warnOfFullChannels(out);
   out.source.substitutes = countSubstitutes(document, false);
+  if (const Value* legs = document.find("legs"); legs && !p.hydraulic)
+    if (const Value* unused = legs->find("hydraulic"))
+      out.source.substitutes -= countSubstitutes(*unused, false);
   out.source.resolved = emit(document);
   out.source.hash = fingerprint(out.source.resolved);
   return out;

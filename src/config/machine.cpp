@@ -54,6 +54,13 @@ Legs readLegs(Section s, const WorkspaceUse& use) {
   legs.filters = s.choice("filters", {"none", "outputs"}) == "none" ? plant::LegFilters::kNone
                                                                     : plant::LegFilters::kOutputs;
   legs.filter_cutoff = s.number("filter_cutoff_rad_per_s", 1e-3, 1e6);
+  if (s.has("hydraulic")) legs.hydraulic = readHydraulics(s.section("hydraulic"), legs.actuator);
+  if (!s.has("model") || s.choice("model", {"ideal", "hydraulic"}) == "ideal")
+    legs.hydraulic.reset();
+  else if (!legs.hydraulic)
+    s.fail("model", "is hydraulic, want a section `hydraulic` that says of what kind");
+  if (legs.hydraulic && legs.filters != plant::LegFilters::kNone)
+    s.fail("filters", "are of ideal legs, want none: hydraulic ones move the platform themselves");
   s.finish();
   legs.codec.offset.setConstant(legs.transducer.offset);
   legs.codec.scale.setConstant(legs.transducer.scale);
@@ -239,6 +246,7 @@ void readPlantMismatch(Section s, plant::PlantConfig& p) {
   factor("gain_extend", p.actuator.gain_extend);
   factor("gain_retract", p.actuator.gain_retract);
   factor("tau", p.actuator.tau);
+  if (p.hydraulic && s.has("tau")) p.hydraulic->leg.valve.frequency /= s.number("tau", 0.01, 100.0);
   factor("sensor_cutoff", p.sensor.cutoff);
   const double mass = s.has("mass") ? s.number("mass", 0.01, 100.0) : 1.0;
   const double center = s.has("center") ? s.number("center", 0.0, 10.0) : 1.0;

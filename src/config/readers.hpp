@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cmath>
+#include <optional>
 
 #include "ves/analysis/platform.hpp"
 #include "ves/config/document.hpp"
@@ -38,10 +39,13 @@ struct Legs {
   plant::Temposonics transducer;
   plant::LegFilters filters = plant::LegFilters::kNone;
   double filter_cutoff = 0.0;
+  std::optional<plant::HydraulicModel> hydraulic;
   LegCodec codec;
 };
 /// What is `derived` follows from what the workspace asks of the legs.
 Legs readLegs(Section s, const WorkspaceUse& use);
+/// legs.hydraulic; areas and flow are not fitted yet
+plant::HydraulicModel readHydraulics(Section s, const plant::ActuatorModel& actuator);
 
 /// sensor
 struct Sensor {

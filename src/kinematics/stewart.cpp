@@ -99,6 +99,17 @@ Vec6 legLengths(const Geometry& geometry, const Transform& X_IP) noexcept {
   return L;
 }
 
+LegLines legLines(const Geometry& geometry, const Transform& X_IP) noexcept {
+  LegLines out;
+  for (int i = 0; i < kLegs; ++i) {
+    const Leg l = leg(geometry, X_IP, i);
+    out.L(i) = l.d.norm();
+    const Vec3 u = l.d / out.L(i);
+    out.J.row(i) << u.transpose(), l.r.cross(u).transpose();
+  }
+  return out;
+}
+
 LegMotion legMotion(const Geometry& geometry, const BodyMotion& P) noexcept {
   LegMotion out;
   for (int i = 0; i < kLegs; ++i) {
@@ -154,13 +165,8 @@ double jointRadius(const Geometry& geometry) noexcept {
 }
 
 double conditionNumber(const Geometry& geometry, const Transform& X_IP) noexcept {
-  const double radius = jointRadius(geometry);
-  Mat6 J;
-  for (int i = 0; i < kLegs; ++i) {
-    const Leg l = leg(geometry, X_IP, i);
-    const Vec3 along = l.d.normalized();
-    J.row(i) << along.transpose(), l.r.cross(along).transpose() / radius;
-  }
+  Mat6 J = legLines(geometry, X_IP).J;
+  J.rightCols<3>() /= jointRadius(geometry);
   const Eigen::PartialPivLU<Mat6> lu(J);
   if (!regular(lu)) return HUGE_VAL;
   return J.norm() * lu.inverse().norm() / 6.0;

@@ -13,6 +13,7 @@ double seconds(std::int64_t ns) { return static_cast<double>(ns) * kSecondPerNan
 constexpr std::int64_t kMidUpdate = kUpdatePeriod / 2;  // [ns]
 constexpr double kStillSpeed = 1e-9;                    // [m/s]
 constexpr std::uint32_t kJointSeed = 0x9e3779b9;        // [-] a stream of its own
+constexpr std::uint32_t kTransducerSeed = 0x7f4a7c15;   // [-] the same
 constexpr std::int64_t kSettle = 100'000'000;           // [ns] between checks whether all is still
 
 LegCounts countsAt(const PlantConfig& config, const Pose& pose) {
@@ -32,10 +33,12 @@ Plant::Plant(const PlantConfig& config)
       filter_position_(config.filter_cutoff),
       filter_velocity_(config.filter_cutoff),
       filter_acceleration_(config.filter_cutoff),
+      transducer_noise_(config.seed ^ kTransducerSeed),
       sensor_step_(sensor_.prepare(seconds(kUpdatePeriod))),
       position_step_(filter_position_.prepare(seconds(kUpdatePeriod))),
       rate_step_(filter_velocity_.prepare(seconds(kUpdatePeriod))),
-      next_step_(kNever),
+      fine_(config.hydraulic && config.task.world),
+      next_step_(fine_ ? kTransducerPeriod / 2 : kNever),
       encoders_(config.joints, Noise(config.seed ^ kJointSeed), config.task.initial_joints),
       joints_read_(config.task.initial_joints),
       robot_(carried(config.payload), config.task.initial_joints) {
@@ -49,7 +52,7 @@ Plant::Plant(const PlantConfig& config)
   began_.fill(kNever);
   for (int i = 0; i < kLegs; ++i) {
     const double L = truth_.legs.L(i);
-    actuators_.emplace_back(config_.actuator, L);
+    if (!config_.hydraulic) actuators_.emplace_back(config_.actuator, L);
     slaves_.emplace_back(config_.leg_slave, config_.transducer.count(L));
   }
   for (const FaultEvent& event : config_.faults)
@@ -64,6 +67,9 @@ Plant::Plant(const PlantConfig& config)
       truth_.target = config_.task.world->environment.target->start;
   }
   sensor_.settle(sensorLoad());
+  magnets_ = truth_.legs.L;
+  if (config_.hydraulic)
+    hydraulic_.emplace(config_.geometry, *config_.hydraulic, truth_.P.X, platformLoad({}));
   if (config.joints.interval > 0) next_joints_ = config.joints.interval;
   if (config.sensor_readings > 1) {
     sensor_interval_ = config.sensor_window / config.sensor_readings;
@@ -148,8 +154,12 @@ double Climate::at(double t) const noexcept {
 bool Plant::still() const noexcept {
   if (next_robot_event_ != kNever || config_.task.world) return false;
   if (truth_.push && truth_.push->end() + kSettle > now_) return false;
-  for (std::size_t i = 0; i < kLegs; ++i)
-    if (slaves_[i].code() != 0 || std::abs(actuators_[i].velocity()) > kStillSpeed) return false;
+  for (const LegSlave& slave : slaves_)
+    if (slave.code() != 0) return false;
+  for (const Actuator& actuator : actuators_)
+    if (std::abs(actuator.velocity()) > kStillSpeed) return false;
+  if (hydraulic_ && !(hydraulic_->motion().v.norm() + hydraulic_->motion().w.norm() < kStillSpeed))
+    return false;
   return !robot_.moving(now_);
 }
 
@@ -181,7 +191,7 @@ void Plant::runEvents(std::int64_t until) noexcept {
     if (next == next_robot_event_) startRobotEvents();
     if (next == next_step_) {
       stepMechanics();
-      next_step_ = kNever;
+      next_step_ = fine_ ? now_ + kTransducerPeriod / 2 : kNever;
     }
     if (next == next_sensor_) {
       readSensor();
@@ -202,8 +212,15 @@ void Plant::runEvents(std::int64_t until) noexcept {
 void Plant::moveActuators(std::int64_t to) noexcept {
   if (to <= now_) return;
   const double dt = seconds(to - now_);
-  const double decay = std::exp(-dt / config_.actuator.tau);
-  for (std::size_t i = 0; i < kLegs; ++i) actuators_[i].advance(current(i), dt, decay);
+  Vec6 currents;
+  for (std::size_t i = 0; i < kLegs; ++i) currents(static_cast<Eigen::Index>(i)) = current(i);
+  if (hydraulic_) {
+    hydraulic_->advance(currents, dt);
+  } else {
+    const double decay = std::exp(-dt / config_.actuator.tau);
+    for (std::size_t i = 0; i < kLegs; ++i)
+      actuators_[i].advance(currents(static_cast<Eigen::Index>(i)), dt, decay);
+  }
   now_ = to;
 }
 
@@ -230,8 +247,19 @@ void Plant::readTransducers() noexcept {
   const LegCounts& reference = watchdog_.reference(now_);
   truth_.parking = watchdog_.parking();
   for (std::size_t i = 0; i < kLegs; ++i)
-    slaves_[i].read(config_.transducer.count(actuators_[i].length()), reference[i]);
-  if (slaves_[0].updated()) next_step_ = now_ + kMidUpdate;
+    slaves_[i].read(config_.transducer.count(reading(i)), reference[i]);
+  if (slaves_[0].updated() && !fine_) next_step_ = now_ + kMidUpdate;
+}
+
+/// [m] that a leg's transducer says: its magnet follows where the piston has taken up the
+/// hysteresis.
+double Plant::reading(std::size_t leg) noexcept {
+  if (!hydraulic_) return actuators_[leg].length();
+  const double L = hydraulic_->leg(static_cast<int>(leg)).length();
+  const ReadingModel& model = config_.hydraulic->reading;
+  double& magnet = magnets_(static_cast<Eigen::Index>(leg));
+  magnet = std::clamp(magnet, L - 0.5 * model.hysteresis, L + 0.5 * model.hysteresis);
+  return model.noise > 0.0 ? magnet + model.noise * transducer_noise_.normal() : magnet;
 }
 
 Wrench Plant::sensorLoad() noexcept {
@@ -243,6 +271,22 @@ Wrench Plant::sensorLoad() noexcept {
 FrameMotion Plant::toolMotion() const noexcept {
   return carriedFrame(robot_.model(), truth_.joints, truth_.P, config_.payload.X_PL0(),
                       config_.task.world->link, config_.task.world->X_link);
+}
+
+/// The robot on the platform, locked, and what it puts on it beyond that: its weight, its joints'
+/// motion, and `further`.
+PlatformLoad Plant::platformLoad(const Wrench& further_So_S) noexcept {
+  const Transform X_PL0 = config_.payload.X_PL0();
+  BodyMotion steady = truth_.P;
+  steady.a = steady.alpha = Vec3::Zero();
+  const Wrench robot_Po_P =
+      transfer(X_PL0, wrenchOnRobot(properMotion(steady, X_PL0, config_.gravity)));
+  PlatformLoad load;
+  load.body_P = combine(RigidBody{}, X_PL0, compositeBody(robot_.model(), truth_.joints.q));
+  const Vec3 w_P = steady.X.R.transpose() * steady.w;
+  load.F_Po_P = inertialWrench(load.body_P, {w_P, Vec3::Zero(), Vec3::Zero()}) - robot_Po_P +
+                transfer(config_.payload.X_PS, further_So_S);
+  return load;
 }
 
 /// What touches the tool while it goes from where it was to where it is, as the sensor feels it:
@@ -317,12 +361,16 @@ LegMotion Plant::legOutputs(double dt) noexcept {
           filter_acceleration_.output().matrix()};
 }
 
-/// Brings platform, robot and sensor from the last step to now.
-void Plant::stepMechanics() noexcept {
-  if (now_ <= last_step_) return;
-  const std::int64_t before = std::exchange(last_step_, now_);
-  const double dt = seconds(now_ - before);
-
+/// Brings the platform from the last step to now. Its acceleration is the mean of that time.
+void Plant::movePlatform(double dt) noexcept {
+  if (hydraulic_) {
+    const BodyMotion before = truth_.P;
+    truth_.P = hydraulic_->motion();
+    truth_.P.a = (truth_.P.v - before.v) / dt;
+    truth_.P.alpha = (truth_.P.w - before.w) / dt;
+    truth_.legs = legMotion(config_.geometry, truth_.P);
+    return;
+  }
   const LegMotion legs = legOutputs(dt);
   Transform guess = truth_.P.X;
   guess.p += dt * truth_.P.v;
@@ -330,15 +378,27 @@ void Plant::stepMechanics() noexcept {
   const ForwardSolution forward = forwardPose(config_.geometry, legs.L, guess, jacobian_);
   truth_.legs_agree =
       forward.ok() && forwardMotion(config_.geometry, forward.X_IP, legs, truth_.P, jacobian_);
+}
+
+/// Brings platform, robot and sensor from the last step to now.
+void Plant::stepMechanics() noexcept {
+  if (now_ <= last_step_) return;
+  const std::int64_t before = std::exchange(last_step_, now_);
+  const double dt = seconds(now_ - before);
+
+  movePlatform(dt);
   truth_.joints = real_joints_ ? *real_joints_ : robot_.at(now_);
 
-  Wrench F_So_S = sensorLoad();
-  if (config_.task.world) F_So_S = F_So_S + meetWorld(dt);
+  Wrench further_So_S;  // of what touches and pushes
+  if (config_.task.world) further_So_S = meetWorld(dt);
   if (truth_.push && truth_.push->push.on != Push::On::kTarget &&
       truth_.push->share(before, now_) > 0.0) {
     const Transform X_IS = truth_.P.X * config_.payload.X_PS;
-    F_So_S = F_So_S + rotate(X_IS.R.transpose(), shift(pushed(before), X_IS.p - truth_.P.X.p));
+    further_So_S =
+        further_So_S + rotate(X_IS.R.transpose(), shift(pushed(before), X_IS.p - truth_.P.X.p));
   }
+  const Wrench F_So_S = sensorLoad() + further_So_S;
+  if (hydraulic_) hydraulic_->carry(platformLoad(further_So_S));
   // Behind Filter 3 the acceleration is smooth again, and known at the end of the step.
   const auto over = config_.filters == LegFilters::kNone ? ForceTorqueSensor::Over::kConstant
                                                          : ForceTorqueSensor::Over::kRamp;
@@ -386,7 +446,7 @@ Sample Plant::sample() noexcept {
   if (!sensor_readings_.empty()) averageSensor(s);
   truth_.F_So_S = sensor_.reading(warmer);
   for (std::size_t i = 0; i < kLegs; ++i) {
-    s.legs[i] = config_.transducer.count(actuators_[i].length());
+    s.legs[i] = config_.transducer.count(reading(i));
     truth_.current(static_cast<Eigen::Index>(i)) = slaves_[i].current();
   }
   if (next_joints_ == kNever) readJoints();

@@ -37,6 +37,13 @@ struct LegMotion {
 /// (C.11), (C.12): |Bi Pi|. (C.11) as printed would count the translation twice; p_PPi_P is meant.
 Vec6 legLengths(const Geometry& geometry, const Transform& X_IP) noexcept;
 
+/// Lengths, and the Jacobian of unit lines: leg rates = J {v_IPo_I, w_IP_I}, (2.24).
+struct LegLines {
+  Vec6 L = Vec6::Zero();  // [m]
+  Mat6 J = Mat6::Zero();  // [- | m] row i: u_i, r_i x u_i
+};
+LegLines legLines(const Geometry& geometry, const Transform& X_IP) noexcept;
+
 /// Lengths, rates (2.25) and accelerations (2.31) for a moving platform.
 LegMotion legMotion(const Geometry& geometry, const BodyMotion& P) noexcept;
 

@@ -6,11 +6,14 @@
 //   every 1023 us  new valve currents (a LegSlave's second reading)
 //                  half a period later, in the middle of the constant current, one step of the
 //                  mechanics: forward kinematics, Newton-Euler on the moving base, sensor
+//                  (on hydraulic legs with something to touch: every 171 us)
 //   when asked     a sample of that moment
 //                  where the A/D converter averages, of its readings over the last controller
 //                  period, in the middles of equal parts
 //
-// The periods are no multiples of each other. Between events the actuators are integrated exactly.
+// The periods are no multiples of each other. Between events ideal actuators are integrated
+// exactly; hydraulic legs move the platform under the load as it was at the last step of the
+// mechanics.
 #pragma once
 
 #include <optional>
@@ -24,6 +27,7 @@
 #include "ves/plant/actuator.hpp"
 #include "ves/plant/faults.hpp"
 #include "ves/plant/force_torque_sensor.hpp"
+#include "ves/plant/hydraulic_platform.hpp"
 #include "ves/plant/joint_encoders.hpp"
 #include "ves/plant/leg_slave.hpp"
 #include "ves/robot/newton_euler.hpp"
@@ -53,7 +57,8 @@ struct PlantConfig {
   Geometry geometry;
   Pose initial_pose;  // about home
   LegSlaveGains leg_slave;
-  ActuatorModel actuator;
+  ActuatorModel actuator;                   // of ideal legs,
+  std::optional<HydraulicModel> hydraulic;  // or legs that feel their load
   Temposonics transducer;
   LegFilters filters = LegFilters::kNone;
   double filter_cutoff = 30.0;  // [rad/s] of Filters 1 to 3
@@ -142,17 +147,23 @@ class Plant {
   bool push(const Push& push) noexcept;
   Wrench pushed(std::int64_t from) const noexcept;
   Wrench meetWorld(double dt) noexcept;
+  PlatformLoad platformLoad(const Wrench& further_So_S) noexcept;
+  double reading(std::size_t leg) noexcept;
+  void movePlatform(double dt) noexcept;
   Wrench wrenchOnRobot(const ProperMotion& L0) noexcept;
   LegMotion legOutputs(double dt) noexcept;
 
   PlantConfig config_;
   Transform X_SL0_;
   std::vector<LegSlave> slaves_;
-  std::vector<Actuator> actuators_;
+  std::vector<Actuator> actuators_;             // ideal legs
+  std::optional<HydraulicPlatform> hydraulic_;  // or the platform on those that feel it
+  Vec6 magnets_;                                // [m] of their transducers
   LegWatchdog watchdog_;
   ForceTorqueSensor sensor_;
   Butterworth2<kLegs> filter_position_;
   Butterworth3<kLegs> filter_velocity_, filter_acceleration_;
+  Noise transducer_noise_;
   ForceTorqueSensor::Step sensor_step_;  // for steps one update period apart
   Butterworth2<kLegs>::Step position_step_;
   Butterworth3<kLegs>::Step rate_step_;
@@ -160,6 +171,7 @@ class Plant {
   std::int64_t now_ = 0;                           // [ns] actuators are here
   std::int64_t last_step_ = 0;                     // [ns] mechanics and sensor are here
   std::int64_t next_reading_ = kTransducerPeriod;  // [ns]
+  bool fine_;                                      // steps of half a Temposonics period
   std::int64_t next_step_ = 0;                     // [ns]
   std::int64_t sensor_interval_ = 0;               // [ns] between two readings that are averaged
   std::int64_t next_sensor_ = kNever;              // [ns]
