@@ -277,8 +277,8 @@ Experiment build(const Value& document, AskedKey* asked = nullptr) {
   root.finish();
   warnOfFullChannels(out);
   out.source.substitutes = countSubstitutes(document, false);
-  if (const Value* legs = document.find("legs"); legs && !p.hydraulic)
-    if (const Value* unused = legs->find("hydraulic"))
+  if (const Value* said = document.find("legs"); said && !p.hydraulic)
+    if (const Value* unused = said->find("hydraulic"))
       out.source.substitutes -= countSubstitutes(*unused, false);
   out.source.resolved = emit(document);
   out.source.hash = fingerprint(out.source.resolved);
