@@ -633,6 +633,28 @@ TEST(Config, HydraulicLegsThatCannotBeAreRefused) {
   }
 }
 
+TEST(Config, WhatGivesWayIsToldOrFollowsFromTheSimulatedLegs) {
+  const auto resonance = [](const std::vector<std::string>& set) {
+    return loadExperiment(scenarios() / "z_sine.yaml", set).controller.resonance;
+  };
+  EXPECT_EQ(resonance({}).frequency, 0.0);
+  const Resonance derived = resonance({"legs.model=hydraulic"});
+  EXPECT_GT(derived.frequency, 0.0);
+  EXPECT_GT(derived.feedback, 0.0);
+  // What the plant is beside the belief is nobody's to know.
+  const Resonance off = resonance({"legs.model=hydraulic", "plant_mismatch={gain_extend: 1.1}"});
+  EXPECT_EQ(off.frequency, derived.frequency);
+  EXPECT_EQ(off.feedback, derived.feedback);
+  const Resonance told = resonance({"machine.legs=external", "machine.resonance.lowest_hz=15",
+                                    "machine.resonance.damping_ratio=0.05"});
+  EXPECT_NEAR(told.frequency, 2.0 * M_PI * 15.0, 1e-9);
+  EXPECT_EQ(told.damping, 0.05);
+  EXPECT_NE(refusal([&] {
+              resonance({"machine.resonance.lowest_hz=15"});
+            }).find("machine.resonance.damping_ratio"),
+            std::string::npos);
+}
+
 TEST(Config, ExcitationsThatFillAProgramAreRefused) {
   std::string program;
   for (int i = 0; i < 13; ++i)

@@ -3,6 +3,7 @@
 // The stability check of a scenario: what it bars, what it names, and which cures it offers.
 #include <gtest/gtest.h>
 
+#include <complex>
 #include <filesystem>
 
 #include "support/rig.hpp"
@@ -239,6 +240,69 @@ TEST(Gate, WhatIsForcedStopsItselfEvenWhereTheEnvelopeHoldsIt) {
     const RunResult result = runLockstep(e, nullptr, {});
     EXPECT_EQ(result.phase, Phase::kStopped) << scenario;
   }
+}
+
+TEST(LoopModel, AMachineThatHardlyGivesWayIsTheRigidOne) {
+  const Experiment e = test::experiment("puma_on_table_4_1", test::kCompensated);
+  Loop loop = loopOf(e.controller, e.plant.task.initial_joints, Direction::kExtending);
+  // Of what swings faster than the base; that hardly notices.
+  const auto slowest = [&] {
+    double out = 0.0;
+    for (const std::complex<double>& root : roots(loop))
+      if (std::abs(std::arg(root)) > 2.0 * M_PI * 3.0 * loop.period)
+        out = std::max(out, std::abs(root));
+    return out;
+  };
+  const double rigid = radius(loop), rigid_slowest = slowest();
+  for (const double feedback : {0.0, 100.0}) {
+    const auto off = [&](double hertz) {
+      loop.resonance = {2.0 * M_PI * hertz, 0.7, feedback, 0.03};
+      EXPECT_NEAR(radius(loop), rigid, 5e-4) << feedback << " " << hertz;
+      return std::abs(slowest() - rigid_slowest);
+    };
+    // In the first order of its lag.
+    EXPECT_LT(off(400.0), 0.025) << feedback;
+    EXPECT_LT(off(200.0), 0.7 * off(100.0)) << feedback;
+    EXPECT_LT(off(100.0), 0.7 * off(50.0)) << feedback;
+  }
+}
+
+/// A compensated PUMA on oil, and what becomes of it when nobody asks.
+Experiment onOil(const std::string& bulk_modulus, const std::string& feedback,
+                 const std::vector<std::string>& more = {}) {
+  std::vector<std::string> set = {"legs.model=hydraulic", "sensor.readings_per_tick=4",
+                                  "legs.hydraulic.bulk_modulus_mpa=" + bulk_modulus,
+                                  "legs.hydraulic.pressure_feedback_ma_per_mpa=" + feedback,
+                                  "controller.still.deviation_counts=3000"};
+  set.insert(set.end(), test::kCompensated.begin(), test::kCompensated.end());
+  return test::experiment("puma_on_table_4_1", set, more);
+}
+
+TEST(Gate, AdmitsOilThatIsDampedAndRefusesWhatGrows) {
+  for (const char* bulk : {"1400", "690"}) {
+    const Experiment damped = onOil(bulk, "1.5"), bare = onOil(bulk, "0");
+    EXPECT_TRUE(isStable(damped.controller, damped.plant.task)) << bulk;
+    EXPECT_EQ(runLockstep(damped, nullptr, {}).phase, Phase::kParked) << bulk;
+    EXPECT_FALSE(isStable(bare.controller, bare.plant.task)) << bulk;
+    EXPECT_EQ(runLockstep(bare, nullptr, {}).phase, Phase::kStopped) << bulk;
+  }
+}
+
+TEST(Gate, NamesWhatCuresAMachineThatGivesWay) {
+  const Experiment bare = onOil("1400", "0");
+  const std::string said = explain(assessStability(bare.controller, bare.plant.task));
+  EXPECT_NE(said.find("which gives way at "), std::string::npos) << said;
+  const auto cutoff = said.find("a sensor cutoff of "), feedback = said.find("feedback of ");
+  ASSERT_NE(std::min(cutoff, feedback), std::string::npos) << said;
+  std::vector<std::string> cure;
+  if (cutoff != std::string::npos)
+    cure.push_back("sensor.cutoff_hz=" + std::to_string(std::stod(said.substr(cutoff + 19))));
+  if (feedback != std::string::npos)
+    cure.push_back("machine.resonance.pressure_feedback_per_s=" +
+                   std::to_string(std::stod(said.substr(feedback + 12))));
+  const Experiment cured = onOil("1400", "0", cure);
+  const LoopVerdict v = assessStability(cured.controller, cured.plant.task);
+  EXPECT_TRUE(v.as_believed) << said;
 }
 
 TEST(LoopModel, BasesKeepTheModesThatTheRuleGives) {

@@ -6,7 +6,7 @@
 
 #include "support/rig.hpp"
 #include "ves/math/dense.hpp"
-#include "ves/plant/hydraulic_platform.hpp"
+#include "ves/plant/nominal_servo.hpp"
 #include "ves/robot/newton_euler.hpp"
 
 namespace ves::plant {
@@ -22,10 +22,12 @@ Experiment machine(const std::string& circuit, const std::vector<std::string>& s
 }
 
 /// A machine whose oil is all that gives way: no seals, no leak, valves that close.
-const std::vector<std::string> kOilAlone = {
-    "legs.hydraulic.coulomb_n=0", "legs.hydraulic.breakaway_n=0",
-    "legs.hydraulic.viscous_n_s_per_m=0", "legs.hydraulic.presliding_n_s_per_m=0",
-    "legs.hydraulic.leak_l_per_min_mpa=0"};
+const std::vector<std::string> kOilAlone = {"legs.hydraulic.pressure_feedback_ma_per_mpa=0",
+                                            "legs.hydraulic.coulomb_n=0",
+                                            "legs.hydraulic.breakaway_n=0",
+                                            "legs.hydraulic.viscous_n_s_per_m=0",
+                                            "legs.hydraulic.presliding_n_s_per_m=0",
+                                            "legs.hydraulic.leak_l_per_min_mpa=0"};
 
 /// [N] of each leg under the plate's weight at home, the mean, by virtual work along z: six legs of
 /// one slope.
@@ -236,47 +238,118 @@ TEST(HydraulicPlatform, SagsOnItsOilAsAStiffnessOfSixLegs) {
   }
 }
 
+/// How the platform swings by itself in one of its modes, which are those of
+/// det(J^T k J - w^2 M) = 0, M of plate and what it carries about Po.
+struct Swing {
+  double due;                 // [rad/s]
+  double frequency, damping;  // [rad/s], [-] as it swings
+  double stiffness;           // [N/m] k
+};
+Swing swing(const Experiment& e, int mode) {
+  const Geometry& g = e.plant.geometry;
+  const Transform home = g.fromHome({});
+  const PlatformLoad load = carriedBy(e);
+  const Mat6 J = legLines(g, home).J;
+  Swing out{};
+  out.stiffness = oilStiffness(e.plant.hydraulic->leg, legLengths(g, home)(0));
+  const Mat6 K = out.stiffness * J.transpose() * J;
+  const Mat6 M = spatialMass(combine(e.plant.hydraulic->plate_P, {}, load.body_P));
+  // In coordinates y = sqrt(M) x the modes are orthogonal; one is excited alone.
+  const SymmetricEigen root = symmetricEigen(M);
+  const Eigen::MatrixXd half =
+      root.vectors * root.values.cwiseSqrt().cwiseInverse().asDiagonal() * root.vectors.transpose();
+  const SymmetricEigen modes = symmetricEigen(half * K * half);
+  out.due = std::sqrt(modes.values(mode));
+  HydraulicPlatform platform(g, *e.plant.hydraulic, home, load);
+  const Vec6 shape = half * modes.vectors.col(mode), push = 0.5 * K * shape / shape.norm() * 1e-4;
+  PlatformLoad pushed = load;
+  pushed.F_Po_P = pushed.F_Po_P + Wrench::from(push);
+  platform.carry(pushed);
+  // Half periods between the turning points of its displacement along the shape's momentum, and the
+  // largest speeds between them, from one way to the other: what creeps falls out.
+  const Vec6 along = M * shape;
+  double before = 0.0, first = 0.0, last = 0.0;
+  std::vector<double> largest = {0.0};
+  constexpr double kFine = 20e-6;  // [s]
+  for (double t = 0.0; largest.size() < 22 && t < 10.0; t += kFine) {
+    platform.advance(Vec6::Zero(), kFine);
+    const BodyMotion& P = platform.motion();
+    const double v = along.dot((Vec6() << P.v, P.w).finished());
+    if (before * v < 0.0) {
+      last = t + kFine - kFine * v / (v - before);
+      if (largest.size() == 1) first = last;
+      largest.push_back(0.0);
+    }
+    if (std::abs(v) > std::abs(largest.back())) largest.back() = v;
+    before = v;
+  }
+  EXPECT_EQ(largest.size(), 22u);
+  out.frequency = M_PI * 20.0 / (last - first);
+  const auto swings = [&](std::size_t n) { return std::abs(largest[n] - largest[n + 1]); };
+  out.damping = std::log(swings(1) / swings(19)) / (18.0 * M_PI);
+  return out;
+}
+
+/// What its controller takes the lowest mode for.
+Resonance believed(const Experiment& e) {
+  return nominalResonance(*e.plant.hydraulic, e.plant.actuator, e.plant.geometry,
+                          carriedBy(e).body_P);
+}
+
 TEST(HydraulicPlatform, SwingsAtTheFrequenciesOfItsOilAndMass) {
-  // det(J^T k J - w^2 M) = 0, M of the plate and what it carries about Po.
   for (const char* circuit : kCircuits) {
     const Experiment e = onItsOil(circuit);
-    const Geometry& g = e.plant.geometry;
-    const Transform home = g.fromHome({});
-    const PlatformLoad load = carriedBy(e);
-    const Mat6 J = legLines(g, home).J;
-    const Mat6 K = oilStiffness(e.plant.hydraulic->leg, legLengths(g, home)(0)) * J.transpose() * J;
-    const Mat6 M = spatialMass(combine(e.plant.hydraulic->plate_P, {}, load.body_P));
-    // In coordinates y = sqrt(M) x the modes are orthogonal; each is excited alone.
-    const SymmetricEigen root = symmetricEigen(M);
-    const Eigen::MatrixXd half = root.vectors *
-                                 root.values.cwiseSqrt().cwiseInverse().asDiagonal() *
-                                 root.vectors.transpose();
-    const SymmetricEigen modes = symmetricEigen(half * K * half);
+    double lowest = HUGE_VAL;
     for (int i = 0; i < 6; ++i) {
-      HydraulicPlatform platform(g, *e.plant.hydraulic, home, load);
-      const Vec6 shape = half * modes.vectors.col(i), push = 0.5 * K * shape / shape.norm() * 1e-4;
-      PlatformLoad pushed = load;
-      pushed.F_Po_P = pushed.F_Po_P + Wrench::from(push);
-      platform.carry(pushed);
-      const double w = std::sqrt(modes.values(i));
-      // Half periods between the turning points of its displacement along the shape's momentum.
-      const Vec6 along = M * shape;
-      double before = 0.0, first = 0.0, last = 0.0;
-      int turns = 0;
-      constexpr double kFine = 20e-6;  // [s]
-      for (double t = 0.0; turns < 21; t += kFine) {
-        platform.advance(Vec6::Zero(), kFine);
-        const BodyMotion& P = platform.motion();
-        const double v = along.dot((Vec6() << P.v, P.w).finished());
-        if (before * v < 0.0) {
-          last = t + kFine - kFine * v / (v - before);
-          if (turns++ == 0) first = last;
-        }
-        before = v;
-        ASSERT_LT(t, 10.0);
-      }
-      EXPECT_NEAR(M_PI * 20.0 / (last - first) / w, 1.0, 0.005) << circuit << " mode " << i;
+      const Swing s = swing(e, i);
+      EXPECT_NEAR(s.frequency / s.due, 1.0, 0.005) << circuit << " mode " << i;
+      lowest = std::min(lowest, s.due);
     }
+    EXPECT_NEAR(believed(e).frequency / lowest, 1.0, 1e-9) << circuit;
+    EXPECT_DOUBLE_EQ(e.controller.resonance.frequency, believed(e).frequency);
+  }
+}
+
+TEST(HydraulicPlatform, LosesItsSwingInOpenValvesAndSeals) {
+  // Drag d of a leg takes d w^2/k of a mode's speed. Of a chamber that is bent by y, with p = y
+  // beta A/V, orifices open by u let k u/2 (1/sqrt(p_S - p) + 1/sqrt(p)) p through: its spring
+  // relaxes at that times beta/V. 2 zeta w is the sum.
+  constexpr double kDrag = 1000.0, kOpen = 0.1e-3;  // [N s/m], [A]
+  for (const char* circuit : kCircuits) {
+    const Experiment e =
+        experiment("puma_on_table_4_1",
+                   with({"legs.model=hydraulic", std::string("legs.hydraulic.circuit=") + circuit},
+                        with(kOilAlone, {"legs.hydraulic.viscous_n_s_per_m=1000",
+                                         "legs.hydraulic.valve_opening_ma=0.1"})));
+    const HydraulicLegModel& leg = e.plant.hydraulic->leg;
+    const CylinderModel& c = leg.cylinder;
+    const bool four = leg.valve.circuit == Circuit::kFourWay;
+    const double L = legLengths(e.plant.geometry, e.plant.geometry.fromHome({}))(0),
+                 p_S = leg.oil.supply;
+    const double V[] = {leg.oil.hoses + c.bore * (L - c.length_min),
+                        leg.oil.hoses + c.rod_side * (c.length_max - L)},
+                 A[] = {c.bore, c.rod_side};
+    // Under plate and robot; the weight's share of a leg by virtual work along z.
+    const double load = (e.plant.hydraulic->plate_P.mass + carriedBy(e).body_P.mass) * 9.81 * L /
+                        (6.0 * e.plant.geometry.home_height);
+    const HydraulicLeg rests(leg, L, load);
+    double relaxes = 0.0, stiffness = 0.0;
+    for (int j = 0; j < (four ? 2 : 1); ++j) {
+      const double p = rests.pressure(j), x = (j == 0 ? 1.0 : -1.0) * rests.spool();
+      const double through =
+          leg.flow * 0.5 * ((kOpen + x) / std::sqrt(p_S - p) + (kOpen - x) / std::sqrt(p));
+      const double k = leg.oil.bulk_modulus * A[j] * A[j] / V[j];
+      stiffness += k;
+      relaxes += k * through * leg.oil.bulk_modulus / V[j];
+    }
+    double least = HUGE_VAL;
+    for (int i = 0; i < 6; ++i) {
+      const Swing s = swing(e, i);
+      const double zeta = 0.5 * (relaxes / stiffness / s.due + kDrag * s.due / stiffness);
+      EXPECT_NEAR(s.damping / zeta, 1.0, 0.05) << circuit << i;
+      least = std::min(least, s.damping);
+    }
+    EXPECT_NEAR(believed(e).damping / least, 1.0, 0.1) << circuit;
   }
 }
 
@@ -343,6 +416,7 @@ const std::vector<std::string> kStiff = {"legs.model=hydraulic",
                                          "legs.hydraulic.coulomb_n=0",
                                          "legs.hydraulic.breakaway_n=0",
                                          "legs.hydraulic.presliding_n_s_per_m=0",
+                                         "legs.hydraulic.pressure_feedback_ma_per_mpa=0",
                                          "legs.hydraulic.viscous_n_s_per_m=10000",
                                          "legs.hydraulic.leak_l_per_min_mpa=0",
                                          "legs.hydraulic.valve_hz=1000",

@@ -18,42 +18,58 @@ using Eigen::RowVectorXd;
 using Eigen::VectorXd;
 
 /// Leg and sensor of one direction, between two updates: x' = A x + B v_end, where v_end is the
-/// speed that the valve's current leads to. x = {length, speed, Filter 3 (3), sensor (2)}.
+/// speed that the valve's current leads to. x = {length, speed, what the valve has let in, its rate
+/// and what of it pressure feedback takes for lasting (3), Filter 3 (3), sensor (2)}. A machine
+/// that gives way follows its oil as
+///   length'' = w^2 (oil - length) - 2 zeta w length'
 struct Mechanics {
-  static constexpr Index kSize = 7, kLength = 0, kSpeed = 1, kFilter = 2, kSensor = 5;
+  static constexpr Index kSize = 10, kLength = 0, kSpeed = 1, kOil = 2, kFilter = 5, kSensor = 8;
   MatrixXd A = MatrixXd::Zero(kSize, kSize);
   VectorXd B = VectorXd::Zero(kSize);
 };
 
 Mechanics mechanicsOf(const Loop& loop) {
   Mechanics m;
-  constexpr Index y = Mechanics::kLength, v = Mechanics::kSpeed, f = Mechanics::kFilter,
-                  s = Mechanics::kSensor;
+  constexpr Index y = Mechanics::kLength, v = Mechanics::kSpeed, q = Mechanics::kOil,
+                  f = Mechanics::kFilter, s = Mechanics::kSensor;
   m.A(y, v) = 1.0;
-  m.A(v, v) = -1.0 / loop.tau;
-  m.B(v) = 1.0 / loop.tau;
-  // The acceleration (v_end - v) / tau goes into Filter 3, a real pole and a pair, or past it.
+  const Resonance& o = loop.resonance;
+  const double w_o = o.frequency;
+  const bool gives = w_o > 0.0;
+  const Index driven = gives ? q + 1 : v;
+  m.A(driven, driven) = -1.0 / loop.tau;
+  m.B(driven) = 1.0 / loop.tau;
+  if (gives) {
+    m.A(q, q + 1) = 1.0;
+    m.A(v, q) = w_o * w_o;
+    m.A(v, y) = -w_o * w_o;
+    m.A(v, v) = -2.0 * o.damping * w_o;
+    // tau oil'' + oil' = v_end - feedback HP(oil - length)
+    m.A(q + 1, q) = -o.feedback / loop.tau;
+    m.A(q + 1, y) = m.A(q + 1, q + 2) = o.feedback / loop.tau;
+    m.A(q + 2, q) = 1.0 / o.feedback_time;
+    m.A(q + 2, y) = m.A(q + 2, q + 2) = -1.0 / o.feedback_time;
+  }
+  // The acceleration goes into Filter 3, a real pole and a pair, or past it.
   const double w3 = loop.filter_cutoff, w = loop.sensor_cutoff;
   const bool filtered = w3 > 0.0;
+  const RowVectorXd acceleration = m.A.row(v);
   if (filtered) {
+    m.A.row(f) = w3 * acceleration;
     m.A(f, f) = -w3;
-    m.A(f, v) = -w3 / loop.tau;
-    m.B(f) = w3 / loop.tau;
+    m.B(f) = w3 * m.B(v);
     m.A(f + 1, f + 2) = 1.0;
     m.A(f + 2, f) = w3 * w3;
     m.A(f + 2, f + 1) = -w3 * w3;
     m.A(f + 2, f + 2) = -w3;
-  } else  // states that nothing reads, and that must not be roots
-    m.A.block<3, 3>(f, f) = -w * Mat3::Identity();
+    m.A(s + 1, f + 1) = w * w;
+  } else {
+    m.A.row(s + 1) = w * w * acceleration;
+    m.B(s + 1) = w * w * m.B(v);
+  }
   m.A(s, s + 1) = 1.0;
   m.A(s + 1, s) = -w * w;
   m.A(s + 1, s + 1) = -M_SQRT2 * w;
-  if (filtered) {
-    m.A(s + 1, f + 1) = w * w;
-  } else {
-    m.A(s + 1, v) = -w * w / loop.tau;
-    m.B(s + 1) = w * w / loop.tau;
-  }
   return m;
 }
 
@@ -118,8 +134,8 @@ MatrixXd throughPeriod(double period, std::vector<Event> events, const MatrixXd&
 /// z = {mechanics, v_end, the first reading of the pair to come, X(k-1) .. X(k-4), the converter's
 /// sum, and of a contact {place, speed of what it leans on, sensor (2), the converter's sum}},
 /// without what nothing reads after the tick: the first reading, which is new before the pair's
-/// second; Filter 3 where it is absent, the earlier readings where there is no derivative gain, the
-/// sums where the converter is read once.
+/// second; the oil of a machine that does not give way, Filter 3 where it is absent, the earlier
+/// readings where there is no derivative gain, the sums where the converter is read once.
 Channel channelOf(const Loop& loop, const std::optional<Leaning>& contact, MatrixXd* places) {
   constexpr Index kHeld = Mechanics::kSize, kFirst = kHeld + 1, kHistory = kFirst + 1,
                   kSum = kHistory + 4, kOther = kSum + 1, kForce = kOther + 2,
@@ -190,9 +206,12 @@ Channel channelOf(const Loop& loop, const std::optional<Leaning>& contact, Matri
   const MatrixXd all = throughPeriod(loop.period, events, generator, places);
   std::vector<Index> kept;
   for (Index i = 0; i < kSize; ++i) {
-    const bool filter = i >= Mechanics::kFilter && i < Mechanics::kSensor,
+    const bool oil = i >= Mechanics::kOil && i < Mechanics::kFilter,
+               lasting = i == Mechanics::kOil + 2,
+               filter = i >= Mechanics::kFilter && i < Mechanics::kSensor,
                history = i >= kHistory && i < kSum, sum = i == kSum || i == kForceSum;
-    if (i != kFirst && (!filter || loop.filter_cutoff > 0.0) &&
+    if (i != kFirst && (!oil || loop.resonance.frequency > 0.0) &&
+        (!lasting || loop.resonance.feedback > 0.0) && (!filter || loop.filter_cutoff > 0.0) &&
         (!history || loop.derivative_gain > 0.0) && (!sum || loop.readings > 1) &&
         (i < kOther || contact) && (i < kOther || i >= kForce || contact->inverse_mass > 0.0))
       kept.push_back(i);

@@ -89,16 +89,37 @@ std::vector<double> feltShares(const ControllerConfig& controller) {
   return {1.0, 0.8, 0.6, 0.4, 0.2};
 }
 
-/// True when the `change`d loop decays with every robot and in both directions.
+/// [rad/s] of what gives way, for which a loop is judged: the lowest mode is known, the others are
+/// somewhere above it.
+std::vector<double> resonances(const ControllerConfig& controller) {
+  const double lowest = controller.resonance.frequency;
+  if (lowest == 0.0) return {0.0};
+  return {lowest, 1.6 * lowest, 2.5 * lowest};
+}
+
+/// A controller's loops of one direction at `q`: every share of the wrench that a dead band leaves,
+/// every resonance.
+std::vector<Loop> loopsOf(const ControllerConfig& controller, const JointVector& q,
+                          Direction direction) {
+  std::vector<Loop> out;
+  Loop loop = loopOf(controller, q, direction);
+  for (const double share : feltShares(controller))
+    for (const double frequency : resonances(controller)) {
+      loop.felt = share;
+      loop.resonance.frequency = frequency;
+      out.push_back(loop);
+    }
+  return out;
+}
+
+/// True when the `change`d loops decay with every robot and in both directions.
 template <class Change>
 bool holds(const ControllerConfig& controller, const RobotTask& task, double growth,
            const std::vector<CarriedRobot>& robots, const Change& change) {
   return std::all_of(std::begin(kBoth), std::end(kBoth), [&](Direction direction) {
-    const std::vector<double> shares = feltShares(controller);
-    return std::all_of(shares.begin(), shares.end(), [&](double share) {
-      Loop loop = loopOf(controller, task.initial_joints, direction);
+    const std::vector<Loop> loops = loopsOf(controller, task.initial_joints, direction);
+    return std::all_of(loops.begin(), loops.end(), [&](Loop loop) {
       loop.allowed_growth = growth;
-      loop.felt = share;
       change(loop);
       return decaysWithAll(loop, robots);
     });
@@ -193,21 +214,19 @@ LoopVerdict assessStability(const ControllerConfig& controller, const RobotTask&
       out.uncertainty = uncertaintyOf(controller.compensation);
       const auto& [timing, gain, mass] = out.off;
       for (const Direction direction : kBoth)
-        for (CarriedRobot robot : robots) {
-          robot.robot_P = scaledDensity(1.0 + mass * out.uncertainty.mass, robot.robot_P);
-          const DominantRoot root =
-              dominantRoot(off(carrying(loopOf(controller, task.initial_joints, direction), robot),
-                               out.uncertainty, timing, gain));
-          if (root.radius > out.at_off.radius) out.at_off = root;
-        }
+        for (const Loop& loop : loopsOf(controller, task.initial_joints, direction))
+          for (CarriedRobot robot : robots) {
+            robot.robot_P = scaledDensity(1.0 + mass * out.uncertainty.mass, robot.robot_P);
+            const DominantRoot root =
+                dominantRoot(off(carrying(loop, robot), out.uncertainty, timing, gain));
+            if (root.radius > out.at_off.radius) out.at_off = root;
+          }
     }
   double largest = 0.0;
   for (const Direction direction : kBoth) {
     double most = 0.0;
     Loop& kept = direction == Direction::kExtending ? out.extending : out.retracting;
-    Loop loop = loopOf(controller, task.initial_joints, direction);
-    for (const double share : feltShares(controller)) {
-      loop.felt = share;
+    for (const Loop& loop : loopsOf(controller, task.initial_joints, direction)) {
       for (const CarriedRobot& robot : robots) {
         const Loop with = carrying(loop, robot);
         const double r = radius(with);
@@ -235,6 +254,19 @@ LoopVerdict assessStability(const ControllerConfig& controller, const RobotTask&
       out.damping_ratio = zeta;
   for (const double share : {0.8, 0.6, 0.4, 0.25, 0.125})
     if (out.K_P == 0.0 && cured([&](Loop& l) { l.velocity_gain *= share; })) out.K_P = share;
+  if (controller.resonance.frequency > 0.0)
+    for (const double cutoff : {1.0, 0.5, 0.25, 0.15})  // the gentlest cure
+      for (const double feedback : {0.0, 50.0, 100.0, 200.0}) {
+        if (out.sensor_cutoff > 0.0 || feedback + 1.0 < controller.resonance.feedback) continue;
+        const double w = cutoff * controller.servo.sensor_cutoff;
+        if (!cured([&](Loop& l) {
+              l.sensor_cutoff = l.model.servo.sensor_cutoff = w;
+              l.resonance.feedback = std::max(l.resonance.feedback, feedback);
+            }))
+          continue;
+        out.sensor_cutoff = w;
+        out.feedback = feedback;
+      }
   return out;
 }
 
@@ -266,10 +298,21 @@ std::string explain(const LoopVerdict& v) {
     add(fmt::format("keep {} of the {} modes", v.stable_modes, v.modes));
   if (v.damping_ratio > 0.0) add(fmt::format("a damping ratio of {:.2f}", v.damping_ratio));
   if (v.K_P > 0.0) add(fmt::format("{:.0f} percent of K_P", 100.0 * v.K_P));
+  if (v.sensor_cutoff > 0.0) {
+    std::string one;
+    if (v.sensor_cutoff < v.extending.sensor_cutoff)
+      one = fmt::format("a sensor cutoff of {:.3g} Hz", v.sensor_cutoff / (2.0 * M_PI));
+    if (v.feedback > 0.0)
+      one +=
+          fmt::format("{}pressure feedback of {:.0f}/s", one.empty() ? "" : " with ", v.feedback);
+    add(one);
+  }
   if (cure.empty()) cure = "a lighter robot or a heavier base";
+  const double gives = v.extending.resonance.frequency / (2.0 * M_PI);
   return fmt::format(
-      "the loop of base, robot and machine would diverge: {}, most in {} (legs {}). What cures it: "
-      "{}",
+      "the loop of base, robot and machine{} would diverge: {}, most in {} (legs {}). What cures "
+      "it: {}",
+      gives > 0.0 ? fmt::format(", which gives way at {:.3g} Hz,", gives) : "",
       explain(v.worst, v.longest), coordinate(static_cast<int>(i)).name,
       v.direction == Direction::kExtending ? "extending" : "retracting", cure);
 }

@@ -178,6 +178,7 @@ Loop loopOf(const ControllerConfig& controller, const JointVector& q, Direction 
   loop.velocity_gain = model;
   loop.derivative_gain = model * own.servo.derivative / (ServoModel::kSpan * own.servo.update);
   loop.tau = own.servo.tau(0);
+  loop.resonance = controller.resonance;
   loop.sensor_cutoff = own.servo.sensor_cutoff;
   loop.filter_cutoff = own.servo.filter_cutoff;
   loop.readings = own.servo.sensor_readings;

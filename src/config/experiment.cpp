@@ -35,6 +35,16 @@ std::string setupOf(const Value& document) {
   return fingerprint(text);
 }
 
+/// With the areas that these gains ask for.
+plant::HydraulicModel fitted(Section& root, plant::HydraulicModel model,
+                             const plant::ActuatorModel& gains, const Geometry& geometry) {
+  if (!fit(model, gains, geometry))
+    root.section("legs").fail("hydraulic",
+                              "no areas give the leg's two gains under the plate's weight, want "
+                              "more supply_mpa or bore_area_cm2, or gains farther apart");
+  return model;
+}
+
 /// [ns] at which an action that begins `now` is over.
 std::int64_t endOf(MovingRobot& robot, const RobotAction& action, std::int64_t now) {
   robot.begin(action, now);
@@ -114,7 +124,6 @@ Experiment build(const Value& document, AskedKey* asked = nullptr) {
   const WorkspaceUse use = readWorkspace(root.section("safety"), c.geometry);
   const Legs legs = readLegs(leg_section, use);
   c.legs = legs.codec;
-  out.machine = readMachine(root.section("machine"), c.period);
   if (root.has("bus")) {
     Section bus = root.section("bus");
     out.key_file = bus.text("key_file");
@@ -197,6 +206,12 @@ Experiment build(const Value& document, AskedKey* asked = nullptr) {
     root.section("robot").fail("gripper_switch",
                                "the robot has no tool, want one: a frame at its end");
   }
+  if (legs.hydraulic) {
+    const plant::HydraulicModel nominal = fitted(root, *legs.hydraulic, legs.actuator, c.geometry);
+    c.resonance = plant::nominalResonance(nominal, legs.actuator, c.geometry,
+                                          lockedRobot(c.payload, p.task.initial_joints));
+  }
+  out.machine = readMachine(root.section("machine"), c.period, c.resonance);
   p.geometry = c.geometry;
   p.initial_pose = readPose(root.section("initial_pose"));
   p.leg_slave = legs.gains;
@@ -218,11 +233,7 @@ Experiment build(const Value& document, AskedKey* asked = nullptr) {
   if (p.hydraulic) {
     if (out.machine.external_legs)
       root.section("legs").fail("model", "is hydraulic, want ideal: the legs are external");
-    if (!fit(*p.hydraulic, p.actuator, p.geometry))
-      root.section("legs").fail(
-          "hydraulic",
-          "no areas give the leg's two gains under the plate's weight, want more "
-          "supply_mpa or bore_area_cm2, or gains farther apart");
+    p.hydraulic = fitted(root, *p.hydraulic, p.actuator, p.geometry);
   }
   const Vec6 L = legLengths(p.geometry, p.geometry.fromHome(p.initial_pose));
   for (int i = 0; i < kLegs; ++i)

@@ -15,6 +15,9 @@ plant::HydraulicModel readHydraulics(Section s, const plant::ActuatorModel& actu
   valve.damping = s.number("valve_damping", 0.05, 100.0);
   valve.limit = s.number("valve_limit_ma", 1.0, 1000.0) * kMilliampere;
   valve.opening = s.number("valve_opening_ma", -10.0, 10.0) * kMilliampere;
+  valve.feedback =
+      s.number("pressure_feedback_ma_per_mpa", 0.0, 1000.0) * kMilliampere / kMegapascal;
+  valve.feedback_time = s.number("pressure_feedback_s", 1e-3, 10.0);
   out.fitted_at = s.number("gains_at_ma", 0.1, 1000.0) * kMilliampere;
   if (!(out.fitted_at + valve.opening > 0.0))
     s.fail("gains_at_ma", "is within the valve's overlap, want more current than opens it");

@@ -221,7 +221,7 @@ ForceSensorSource readForceSensor(Section& machine) {
 
 }  // namespace
 
-MachinePieces readMachine(Section s, std::int64_t controller_period) {
+MachinePieces readMachine(Section s, std::int64_t controller_period, Resonance& resonance) {
   MachinePieces m;
   const auto external = [&](const char* key) {
     return s.choice(key, {"simulated", "external"}) == "external";
@@ -233,6 +233,22 @@ MachinePieces readMachine(Section s, std::int64_t controller_period) {
   // A quick controller finds a new sample in every tick, whenever in it it wakes.
   m.period = std::min(s.integer("sample_period_ns", 200'000, 100'000'000), controller_period / 2);
   m.follow = s.number("follow_per_s", 1.0, 1e4);
+  if (s.has("resonance")) {
+    constexpr double kTurn = 2.0 * M_PI;
+    Section told = s.section("resonance");
+    // Only of simulated legs anything follows; what swings faster no controller notices.
+    constexpr double kFastest = 200.0;  // [Hz]
+    if (m.external_legs || resonance.frequency > kFastest * kTurn) resonance = {};
+    const bool derived = resonance.frequency > 0.0;
+    resonance.frequency =
+        kTurn * told.numberOr("lowest_hz", 0.0, kFastest, resonance.frequency / kTurn);
+    if (!derived) resonance.damping = resonance.frequency > 0.0 ? NAN : 1.0;
+    resonance.damping = told.numberOr("damping_ratio", 0.0, 10.0, resonance.damping);
+    resonance.feedback = told.numberOr("pressure_feedback_per_s", 0.0, 1e5, resonance.feedback);
+    resonance.feedback_time =
+        told.numberOr("pressure_feedback_s", 1e-3, 10.0, resonance.feedback_time);
+    told.finish();
+  }
   s.finish();
   return m;
 }

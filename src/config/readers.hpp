@@ -86,8 +86,9 @@ void readController(Section s, ControllerConfig& c);
 /// program, with the events of robot and faults; `out` has the machine and the robot already
 void readProgram(Section& root, Experiment& out);
 
-/// machine
-MachinePieces readMachine(Section s, std::int64_t controller_period);
+/// machine; `resonance` as derived, where the legs are simulated ones that give way, and as it is
+/// told afterwards
+MachinePieces readMachine(Section s, std::int64_t controller_period, Resonance& resonance);
 
 /// plant_mismatch
 void readPlantMismatch(Section s, plant::PlantConfig& p);

@@ -104,6 +104,7 @@ HydraulicLeg::HydraulicLeg(const HydraulicLegModel& model, double length, double
     (flow.in - flow.out + model_.oil.leak * (p_[1] - p_[0]) > 0.0 ? hi : lo) = x;
   }
   eta_ << 0.5 * (lo + hi), 0.0;
+  pressed_ = loadPressure();
 }
 
 SecondOrderHold HydraulicLeg::prepare(double dt) const noexcept {
@@ -136,9 +137,15 @@ double HydraulicLeg::stopForce() const noexcept {
   return c.stop * (std::max(0.0, c.length_min - y_) - std::max(0.0, y_ - c.length_max));
 }
 
-double HydraulicLeg::openSpool(double current, const SecondOrderHold& spool) noexcept {
+double HydraulicLeg::loadPressure() const noexcept {
+  return p_[0] - model_.cylinder.rod_side / model_.cylinder.bore * p_[1];
+}
+
+double HydraulicLeg::openSpool(double current, double dt, const SecondOrderHold& spool) noexcept {
   const ValveModel& valve = model_.valve;
-  const double wanted = std::clamp(current, -valve.limit, valve.limit) + valve.null;
+  pressed_ += dt / (valve.feedback_time + dt) * (loadPressure() - pressed_);
+  const double asked = current - valve.feedback * (loadPressure() - pressed_),
+               wanted = std::clamp(asked, -valve.limit, valve.limit) + valve.null;
   const double from = eta_(0);
   eta_ = spool.Phi * eta_ + spool.Gamma * (valve.frequency * valve.frequency * wanted);
   return 0.5 * (from + eta_(0));
@@ -203,7 +210,7 @@ double HydraulicLeg::wayThroughPlay(double length, double dt,
 
 void HydraulicLeg::drift(double current, double length, double dt,
                          const SecondOrderHold& spool) noexcept {
-  const double x = openSpool(current, spool);
+  const double x = openSpool(current, dt, spool);
   const double past = model_.oil.leak * (p_[1] - p_[0]);  // the piston, into the bore
   std::array<Flow, 2> flow;
   flow[0] = through(x, p_[0]);

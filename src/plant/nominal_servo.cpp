@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/plant/nominal_servo.hpp"
 
+#include <cmath>
+
+#include "ves/math/dense.hpp"
+#include "ves/robot/newton_euler.hpp"
+
 namespace ves::plant {
 namespace {
 
@@ -37,6 +42,50 @@ ServoModel nominalServo(const LegSlaveGains& gains, const ActuatorModel& actuato
   s.readings.offset.setConstant(transducer.offset);
   s.readings.scale.setConstant(transducer.scale);
   return s;
+}
+
+Resonance nominalResonance(const HydraulicModel& hydraulic, const ActuatorModel& gains,
+                           const Geometry& geometry, const RigidBody& load_P) {
+  const HydraulicLegModel& leg = hydraulic.leg;
+  const CylinderModel& c = leg.cylinder;
+  const LegLines home = legLines(geometry, geometry.fromHome({}));
+  const Mat6 M = spatialMass(combine(hydraulic.plate_P, {}, load_P));
+  // Modes of equal legs: J^T J v = lambda M v.
+  const Eigen::LLT<Mat6> llt(M);
+  const Mat6 half = llt.matrixL().solve(Mat6(home.J.transpose()));
+  const Eigen::VectorXd lambda = symmetricEigenvalues(half * half.transpose());
+
+  // A chamber's pressure changes by `stiffens` [Pa/m], and its orifices pass `passes` [m^3/s/Pa] of
+  // it at null, where the spool is where as much flows in as out:
+  //   k u_0 p_S / (sqrt(p_1) + sqrt(p_S - p_1)) / sqrt(p_1 (p_S - p_1))
+  const double L = home.L.mean(), p_S = leg.oil.supply;
+  const bool four_way = leg.valve.circuit == Circuit::kFourWay;
+  const double stiffens[] = {
+      leg.oil.bulk_modulus * c.bore / (leg.oil.hoses + c.bore * (L - c.length_min)),
+      four_way
+          ? leg.oil.bulk_modulus * c.rod_side / (leg.oil.hoses + c.rod_side * (c.length_max - L))
+          : 0.0};
+  const double k = c.bore * stiffens[0] + c.rod_side * stiffens[1];  // [N/m]
+  const double p_1 = p_S * c.rod_side / (four_way ? c.bore + c.rod_side : c.bore),
+               root_1 = std::sqrt(p_1), root_2 = std::sqrt(p_S - p_1),
+               passes = leg.flow * std::max(0.0, leg.valve.opening) * p_S /
+                        ((root_1 + root_2) * root_1 * root_2);
+  // [N/m/s] by which a leg's force on its oil falls when that is bent by a metre.
+  const double both = stiffens[0] + stiffens[1],
+               yields = passes * (stiffens[0] * stiffens[0] + stiffens[1] * stiffens[1]) +
+                        leg.oil.leak * both * both;
+
+  Resonance out;
+  out.frequency = std::sqrt(k * lambda.minCoeff());
+  out.damping = HUGE_VAL;
+  for (const double one : lambda) {
+    const double w = std::sqrt(k * one);
+    out.damping = std::min(out.damping, 0.5 * (yields / k / w + leg.seals.viscous * w / k));
+  }
+  const double speed = 0.5 * (gains.gain_extend + gains.gain_retract);  // [m/s/A]
+  out.feedback = speed * leg.valve.feedback * k / c.bore;
+  out.feedback_time = leg.valve.feedback_time;
+  return out;
 }
 
 }  // namespace ves::plant

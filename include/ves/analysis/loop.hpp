@@ -15,8 +15,14 @@
 // the actuators K/(s(tau s + 1)), Filter 3 (the one on accelerations), the sensor's filter. Lifted
 // exactly over a period that holds a whole number of LegSlave updates, which the real ones miss by
 // up to half an update (100 Hz: ten for 9.775). All legs have one gain here, so the six directions
-// of the platform pass through six equal channels; which gain is looked at is Direction's. Left
-// out: quantisation, limits, and gravity on a tilting robot, which the controller compensates.
+// of the platform pass through six equal channels; which gain is looked at is Direction's.
+//
+// A machine may give way: oil under the platform's mass. In coordinates of its modes, platform with
+// robot on six springs that are the legs, each channel has its own frequency; here all six have
+// one, which may be that of any mode.
+//
+// Left out: quantisation, limits, what a contact's force does to legs that give way, and gravity on
+// a tilting robot, which the controller compensates.
 #pragma once
 
 #include <optional>
@@ -43,6 +49,7 @@ struct Loop {
   double velocity_gain = 0.0;    // [1/s] of the servo, speed per error of length
   double derivative_gain = 0.0;  // [1/s] the same for X(k) - X(k-4)
   double tau = 0.0;              // [s] of the actuator
+  Resonance resonance;           // of what gives way behind it
   double filter_cutoff = 0.0;    // [rad/s] of Filter 3; 0: none
   double sensor_cutoff = 0.0;    // [rad/s]
   int readings = 1;              // [-] of the A/D converter, averaged over a period

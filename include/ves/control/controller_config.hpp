@@ -82,6 +82,16 @@ struct JointSensors {
   double interval = 0.0;                        // [s] between two readings; 0: read when asked
 };
 
+/// What gives way between the servos and where the platform is: the oil in the legs under its mass,
+/// or structure. One mode.
+struct Resonance {
+  double frequency = 0.0;  // [rad/s] 0: nothing gives way
+  double damping = 0.0;    // [-] ratio, without
+  // pressure feedback: speed that a valve takes back per what has given way of late.
+  double feedback = 0.0;        // [1/s]
+  double feedback_time = 0.03;  // [s] of its high-pass
+};
+
 /// What the controller takes the machine, its load and the vehicle for: from data sheets,
 /// identifications and guesses. What judges or decides for it (stability, limits, plans) knows this
 /// and nothing more; what the machine truly is, plant::PlantConfig says.
@@ -97,6 +107,7 @@ struct Belief {
   ModalModel admittance;             // the vehicle
   LegCodec legs;
   ServoModel servo;
+  Resonance resonance;  // the lowest, with the least damping of any
 };
 
 /// A belief, and what is asked of the controller that holds it.

@@ -3,7 +3,8 @@
 // One leg that feels its load: servo valve, orifices, oil, piston, seals and play, as they are
 // before (2.17) linearises them.
 //
-//   valve    x'' + 2 zeta w x' + w^2 x = w^2 (i + null)     spool, counted in amperes
+//   valve    x'' + 2 zeta w x' + w^2 x = w^2 (i + null - c HP(F/A_1))
+//            the spool, counted in amperes; c: pressure feedback, HP a high-pass
 //   orifice  Q = c_d w k_j x sqrt(2/rho (p_S - p))          (2.11)
 //            `flow` stands for c_d w k_j sqrt(2/rho)
 //   oil      p' = beta/V (Q - A y')                         (2.15), and it gives way
@@ -39,6 +40,9 @@ struct ValveModel {
   double opening = 0.0;    // [A] of either edge at null; negative: both are closed so far
   double limit = 0.0;      // [A] at most
   double null = 0.0;       // [A] of the spool without current, as its screw is set
+  // Dynamic pressure feedback: what the load's pressure has changed by of late closes it.
+  double feedback = 0.0;         // [A/Pa]
+  double feedback_time = 0.03;   // [s] of its high-pass
 };
 
 struct OilModel {
@@ -123,7 +127,8 @@ class HydraulicLeg {
     std::array<double, 2> dN{}, change{}, p{};  // [m^3, Pa, Pa] of the chambers; implicit change
     double z = 0.0;                             // [m]
   };
-  double openSpool(double current, const SecondOrderHold& spool) noexcept;
+  double openSpool(double current, double dt, const SecondOrderHold& spool) noexcept;
+  double loadPressure() const noexcept;
   Flow through(double towards, double p) const noexcept;
   Moved moved(double dy, double dt, const std::array<Flow, 2>& flow) const noexcept;
   double wayThroughPlay(double length, double dt, const std::array<Flow, 2>& flow) const noexcept;
@@ -137,6 +142,7 @@ class HydraulicLeg {
   Eigen::Vector2d eta_;          // [A, A/s] spool
   std::array<double, 2> oil_{};  // [m^3] N of each chamber, without pressure
   std::array<double, 2> p_{};    // [Pa]
+  double pressed_;               // [Pa] loadPressure() behind the feedback's low-pass
   double z_ = 0.0;               // [m] of the seals' bristles
   double v_ = 0.0;               // [m/s] of the piston, last
   HydraulicLosses losses_;

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// The servos as the controller may model them: what a LegSlave's gains make of an actuator.
+// The servos as the controller may model them: what a LegSlave's gains make of an actuator, and the
+// oil's swing behind it.
 #pragma once
 
-#include "ves/control/servo.hpp"
-#include "ves/plant/actuator.hpp"
+#include "ves/control/controller_config.hpp"
+#include "ves/plant/hydraulic_platform.hpp"
 #include "ves/plant/leg_slave.hpp"
 
 namespace ves::plant {
@@ -21,5 +22,11 @@ double derivativeTime(const LegSlaveGains& gains);
 /// All legs alike, without any delay on the way to them.
 ServoModel nominalServo(const LegSlaveGains& gains, const ActuatorModel& actuator,
                         const Temposonics& transducer);
+
+/// The lowest of the six modes of plate and load on the oil behind closed valves at home, and the
+/// least damping of any, by what flows at null with the pressure and by viscous seals; sliding
+/// friction is not counted. `hydraulic` with its areas fitted.
+Resonance nominalResonance(const HydraulicModel& hydraulic, const ActuatorModel& gains,
+                           const Geometry& geometry, const RigidBody& load_P);
 
 }  // namespace ves::plant
