@@ -633,6 +633,29 @@ TEST(Config, HydraulicLegsThatCannotBeAreRefused) {
   }
 }
 
+TEST(Config, FaultsOfCylindersAreOfHydraulicLegs) {
+  const auto said = [](const std::string& fault, const std::string& model) {
+    return refusal([&] {
+      loadExperiment(
+          scenarios() / "z_sine.yaml",
+          {"legs.model=" + model,
+           "program=[{move: {}, faults: [{at_s: 0, duration_s: 1, fault: " + fault + "}]}]"});
+    });
+  };
+  for (const char* fault :
+       {"supply_falls, share: 0.3", "leg_leaks, which: 2, l_per_min_mpa: 1",
+        "air_in_oil, which: 6, share: 0.1", "leg_sticks, which: 1, newtons: 900",
+        "seal_worn, which: 3, l_per_min_mpa: 0.5"}) {
+    EXPECT_EQ(said(fault, "hydraulic"), "") << fault;
+    EXPECT_NE(said(fault, "ideal").find("want legs.model: hydraulic"), std::string::npos) << fault;
+  }
+  EXPECT_EQ(said("valve_stuck, which: 1", "hydraulic"), "");
+  EXPECT_NE(said("air_in_oil, which: 6, share: 0", "hydraulic").find("share: '0', want"),
+            std::string::npos);
+  EXPECT_NE(said("air_in_oil, which: 7, share: 0.5", "hydraulic").find("which: '7', want"),
+            std::string::npos);
+}
+
 TEST(Config, WhatGivesWayIsToldOrFollowsFromTheSimulatedLegs) {
   const auto resonance = [](const std::vector<std::string>& set) {
     return loadExperiment(scenarios() / "z_sine.yaml", set).controller.resonance;

@@ -63,6 +63,8 @@ class PushedMass {
     const double from = L_, ran = run(current, time, dt);
     return (L_ - from) / ran;
   }
+  void become(const HydraulicLegModel& model) { leg_.become(model); }
+  void press(double load) { load_ = load; }
   double speed() const { return v_; }
   double length() const { return L_; }
   const HydraulicLeg& leg() const { return leg_; }
@@ -388,15 +390,76 @@ double unaccounted(const Experiment& e, double until, double current) {
 TEST(HydraulicPlatform, BalancesItsEnergy) {
   // What supply and load have given is in store, or gone in orifices, leaks, seals and stops.
   for (const char* circuit : kCircuits) {
-    const Experiment e =
+    Experiment e =
         experiment("puma_on_table_4_1",
                    {"legs.model=hydraulic", std::string("legs.hydraulic.circuit=") + circuit,
                     "legs.hydraulic.play_m=0.0001", "legs.hydraulic.leak_l_per_min_mpa=0.05"});
+    e.plant.hydraulic->leg.oil.outside = 1e-12;
     EXPECT_LT(std::abs(unaccounted(e, 3.0, 0.0)), 1e-6) << circuit;
     // At full speed into the ends of the strokes, where forces begin within a step.
     EXPECT_LT(std::abs(unaccounted(e, 4.0, 0.03)), 2e-4) << circuit;
     EXPECT_LT(std::abs(unaccounted(e, 4.0, -0.03)), 2e-4) << circuit;
   }
+}
+
+// --- Faults -------------------------------------------------------------------------------------
+
+TEST(HydraulicFaults, SpeedsAreThoseOfWhatIsLeft) {
+  // A leg without seals or leaks, extending: A v = k x sqrt(p_S - p), p = (A_2 p_S + F)/A_1.
+  const Experiment e = machine("three_way", kOilAlone);
+  const HydraulicLegModel whole = e.plant.hydraulic->leg;
+  const double load = plateLoad(e), current = 0.01;
+  const auto speed = [&](const HydraulicLegModel& model) {
+    PushedMass m(whole, 20.0, load);
+    m.run(current, 0.2);
+    m.become(model);
+    m.run(current, 0.3);
+    return m.meanSpeed(current, 0.1);
+  };
+  const auto due = [&](double supply, double outside, double leak) {
+    const CylinderModel& c = whole.cylinder;
+    const double p = (c.rod_side * supply + load) / c.bore,
+                 in = whole.flow * (current + whole.valve.null + whole.valve.opening) *
+                      std::sqrt(supply - p);
+    return (in + leak * (supply - p) - outside * p) / c.bore;
+  };
+  const double p_S = whole.oil.supply, some = 5e-12;  // [Pa], [m^3/s/Pa]
+  HydraulicLegModel low = whole, leaks = whole, worn = whole, stuck = whole;
+  low.oil.supply *= 0.4;
+  leaks.oil.outside = some;
+  worn.oil.leak = some;
+  EXPECT_NEAR(speed(low) / due(0.4 * p_S, 0.0, 0.0), 1.0, 0.01);
+  EXPECT_NEAR(speed(leaks) / due(p_S, some, 0.0), 1.0, 0.01);
+  EXPECT_NEAR(speed(worn) / due(p_S, 0.0, some), 1.0, 0.01);
+  EXPECT_LT(due(0.4 * p_S, 0.0, 0.0), 0.7 * due(p_S, 0.0, 0.0));
+
+  // A spool that is stuck goes on as it was, whatever is asked.
+  PushedMass m(whole, 20.0, load);
+  m.run(current, 0.2);
+  stuck.valve.stuck = true;
+  m.become(stuck);
+  EXPECT_NEAR(m.meanSpeed(-current, 0.2) / due(p_S, 0.0, 0.0), 1.0, 0.01);
+}
+
+TEST(HydraulicFaults, AirLetsALegGiveWay) {
+  const Experiment e = machine("three_way", with(kOilAlone, kShut));
+  const auto stiffness = [&](double share) {
+    const HydraulicLegModel whole = e.plant.hydraulic->leg;
+    HydraulicLegModel aired = whole;
+    aired.oil.bulk_modulus *= share;
+    constexpr double kMore = 200.0;  // [N]
+    PushedMass m(whole, 20.0, 300.0);
+    m.become(aired);
+    const double before = m.length();
+    m.press(300.0 + kMore);
+    double mean = 0.0;  // it swings
+    for (int n = 0; n < 20'000; ++n) {
+      m.step(0.0, kStep);
+      mean += m.length() / 20'000;
+    }
+    return kMore / (before - mean);
+  };
+  EXPECT_NEAR(stiffness(0.1) / stiffness(1.0), 0.1, 0.005);
 }
 
 // --- In the machine ------------------------------------------------------------------------------

@@ -89,12 +89,12 @@ std::vector<double> feltShares(const ControllerConfig& controller) {
   return {1.0, 0.8, 0.6, 0.4, 0.2};
 }
 
-/// [rad/s] of what gives way, for which a loop is judged: the lowest mode is known, the others are
-/// somewhere above it.
+/// [rad/s] of what gives way, for which a loop is judged: the lowest mode is known about, the
+/// others are somewhere above it.
 std::vector<double> resonances(const ControllerConfig& controller) {
   const double lowest = controller.resonance.frequency;
   if (lowest == 0.0) return {0.0};
-  return {lowest, 1.6 * lowest, 2.5 * lowest};
+  return {0.9 * lowest, 1.25 * lowest, 1.7 * lowest, 2.4 * lowest};
 }
 
 /// A controller's loops of one direction at `q`: every share of the wrench that a dead band leaves,

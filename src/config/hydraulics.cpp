@@ -4,8 +4,8 @@
 namespace ves {
 
 plant::HydraulicModel readHydraulics(Section s, const plant::ActuatorModel& actuator) {
-  constexpr double kLitre = 1e-3, kCubicCentimetre = 1e-6, kSquareCentimetre = 1e-4;
-  constexpr double kPerMinute = 1.0 / 60.0, kMilliampere = 1e-3, kMegapascal = 1e6;
+  constexpr double kCubicCentimetre = 1e-6, kSquareCentimetre = 1e-4;
+  constexpr double kMilliampere = 1e-3, kMegapascal = 1e6;
   plant::HydraulicModel out;
   plant::ValveModel& valve = out.leg.valve;
   valve.circuit = s.choice("circuit", {"three_way", "four_way"}) == "three_way"
@@ -26,7 +26,7 @@ plant::HydraulicModel readHydraulics(Section s, const plant::ActuatorModel& actu
   oil.supply = s.number("supply_mpa", 0.1, 100.0) * kMegapascal;
   oil.bulk_modulus = s.number("bulk_modulus_mpa", 10.0, 1e6) * kMegapascal;
   oil.hoses = s.number("hose_volume_cm3", 0.1, 1e5) * kCubicCentimetre;
-  oil.leak = s.number("leak_l_per_min_mpa", 0.0, 100.0) * kLitre * kPerMinute / kMegapascal;
+  oil.leak = s.number("leak_l_per_min_mpa", 0.0, 100.0) * kOilFlow;
 
   plant::CylinderModel& cylinder = out.leg.cylinder;
   cylinder.bore = s.number("bore_area_cm2", 0.01, 1e4) * kSquareCentimetre;

@@ -151,6 +151,9 @@ class ProgramReader {
     if (at == names.end())
       s.fail("fault", fmt::format("'{}', want one of {}", fault, fmt::join(names, ", ")));
     event.fault = static_cast<Fault>(at - names.begin());
+    if (isHydraulic(event.fault) && !out_.plant.hydraulic)
+      s.fail("fault", fmt::format("{} is of hydraulic legs, want legs.model: hydraulic", fault));
+    const auto which = [&] { return static_cast<int>(s.integer("which", 1, 6)) - 1; };
     switch (event.fault) {
       case Fault::kWrenchStep:
       case Fault::kLegJump: event.amount = s.number("counts", -65536.0, 65536.0); [[fallthrough]];
@@ -159,7 +162,18 @@ class ProgramReader {
       case Fault::kLegOutOfRange:
       case Fault::kValveStuck:
       case Fault::kRunaway:  // from 1, as the legs and channels are called
-        event.index = static_cast<int>(s.integer("which", 1, 6)) - 1;
+        event.index = which();
+        break;
+      case Fault::kAirInOil: event.index = which(); [[fallthrough]];
+      case Fault::kSupplyFalls: event.amount = s.number("share", 0.001, 1.0); break;
+      case Fault::kLegLeaks:
+      case Fault::kSealWorn:
+        event.index = which();
+        event.amount = s.number("l_per_min_mpa", 0.0, 100.0) * kOilFlow;
+        break;
+      case Fault::kLegSticks:
+        event.index = which();
+        event.amount = s.number("newtons", 0.0, 1e5);
         break;
       case Fault::kPressure: event.amount = s.number("volts", -10.0, 10.0); break;
       case Fault::kLate: event.amount = static_cast<double>(s.integer("samples", 1, 15)); break;

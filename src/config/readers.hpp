@@ -44,6 +44,8 @@ struct Legs {
 };
 /// What is `derived` follows from what the workspace asks of the legs.
 Legs readLegs(Section s, const WorkspaceUse& use);
+/// [m^3/s/Pa] of an l/min/MPa.
+inline constexpr double kOilFlow = 1e-3 / 60.0 / 1e6;
 /// legs.hydraulic; areas and flow are not fitted yet
 plant::HydraulicModel readHydraulics(Section s, const plant::ActuatorModel& actuator);
 

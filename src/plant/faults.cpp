@@ -18,6 +18,11 @@ std::string_view name(Fault fault) noexcept {
     case Fault::kLegOutOfRange: return "leg_out_of_range";
     case Fault::kValveStuck: return "valve_stuck";
     case Fault::kRunaway: return "runaway";
+    case Fault::kSupplyFalls: return "supply_falls";
+    case Fault::kLegLeaks: return "leg_leaks";
+    case Fault::kAirInOil: return "air_in_oil";
+    case Fault::kLegSticks: return "leg_sticks";
+    case Fault::kSealWorn: return "seal_worn";
     case Fault::kJointsLost: return "joints_lost";
     case Fault::kLost: return "samples_lost";
     case Fault::kLate: return "samples_late";
@@ -59,6 +64,10 @@ void Injector::apply(const FaultEvent& event, bool active, double volts_per_coun
       sample.adc[kWrenchChannels] =
           static_cast<std::int32_t>(std::lround(event.amount / volts_per_count));
       break;
+    case Fault::kSupplyFalls:
+      sample.adc[kWrenchChannels] =
+          static_cast<std::int32_t>(std::lround(event.amount * sample.adc[kWrenchChannels]));
+      break;
     case Fault::kLegFrozen: sample.legs[i] = first_->legs[i]; break;
     case Fault::kLegJump: sample.legs[i] += static_cast<std::int32_t>(event.amount); break;
     case Fault::kLegOutOfRange: sample.legs[i] = 1 << 14; break;
@@ -71,7 +80,11 @@ void Injector::apply(const FaultEvent& event, bool active, double volts_per_coun
     case Fault::kPanicButton: sample.switches &= ~kPanicButtonClosed; break;
     case Fault::kFloorMat: sample.switches &= ~kFloorMatClosed; break;
     case Fault::kValveStuck:
-    case Fault::kRunaway:  // the valves are the plant's
+    case Fault::kRunaway:  // valves and cylinders are the plant's
+    case Fault::kLegLeaks:
+    case Fault::kAirInOil:
+    case Fault::kLegSticks:
+    case Fault::kSealWorn:
     case Fault::kCount: break;
   }
 }

@@ -107,6 +107,13 @@ HydraulicLeg::HydraulicLeg(const HydraulicLegModel& model, double length, double
   pressed_ = loadPressure();
 }
 
+void HydraulicLeg::become(const HydraulicLegModel& model) noexcept {
+  model_ = model;
+  if (metered_ == 1) p_[1] = model_.oil.supply;
+  for (std::size_t k = 0; k < 2; ++k)
+    oil_[k] = volume(k, y_) * std::exp(p_[k] / model_.oil.bulk_modulus);
+}
+
 SecondOrderHold HydraulicLeg::prepare(double dt) const noexcept {
   const double w = model_.valve.frequency;
   return discretise(w * w, 2.0 * model_.valve.damping * w, dt);
@@ -143,6 +150,7 @@ double HydraulicLeg::loadPressure() const noexcept {
 
 double HydraulicLeg::openSpool(double current, double dt, const SecondOrderHold& spool) noexcept {
   const ValveModel& valve = model_.valve;
+  if (valve.stuck) return eta_(0);
   pressed_ += dt / (valve.feedback_time + dt) * (loadPressure() - pressed_);
   const double asked = current - valve.feedback * (loadPressure() - pressed_),
                wanted = std::clamp(asked, -valve.limit, valve.limit) + valve.null;
@@ -211,10 +219,11 @@ double HydraulicLeg::wayThroughPlay(double length, double dt,
 void HydraulicLeg::drift(double current, double length, double dt,
                          const SecondOrderHold& spool) noexcept {
   const double x = openSpool(current, dt, spool);
-  const double past = model_.oil.leak * (p_[1] - p_[0]);  // the piston, into the bore
+  const double past = model_.oil.leak * (p_[1] - p_[0]),  // the piston, into the bore
+      lost = model_.oil.outside * p_[0];
   std::array<Flow, 2> flow;
   flow[0] = through(x, p_[0]);
-  flow[0].past = past;
+  flow[0].past = past - lost;
   if (metered_ == 2) {
     flow[1] = through(-x, p_[1]);
     flow[1].past = -past;
@@ -232,7 +241,7 @@ void HydraulicLeg::drift(double current, double length, double dt,
     losses_.valve += in * (h_S - h[k]) + out * h[k];
   }
   if (metered_ == 1) losses_.supplied += h_S * (m.dN[1] + dt * past);
-  losses_.leak += dt * past * (h[1] - h[0]);
+  losses_.leak += dt * (past * (h[1] - h[0]) + lost * h[0]);
   const double bent = m.z - z_;
   losses_.seals += 0.5 * model_.seals.bristle * (m.z + z_) * (dy - bent);
 

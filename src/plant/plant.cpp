@@ -55,9 +55,12 @@ Plant::Plant(const PlantConfig& config)
     if (!config_.hydraulic) actuators_.emplace_back(config_.actuator, L);
     slaves_.emplace_back(config_.leg_slave, config_.transducer.count(L));
   }
-  for (const FaultEvent& event : config_.faults)
-    if (event.fault == Fault::kValveStuck || event.fault == Fault::kRunaway)
-      valve_faults_.push_back(event);
+  for (const FaultEvent& event : config_.faults) {
+    const bool stuck = event.fault == Fault::kValveStuck;
+    if (stuck || event.fault == Fault::kRunaway) valve_faults_.push_back(event);
+    if (config_.hydraulic && (stuck || isHydraulic(event.fault))) leg_faults_.push_back(event);
+  }
+  worn_.assign(leg_faults_.size(), false);
   filter_position_.settle(truth_.legs.L.array());
   filter_velocity_.settle(Vec6::Zero().array());
   filter_acceleration_.settle(Vec6::Zero().array());
@@ -215,6 +218,7 @@ void Plant::moveActuators(std::int64_t to) noexcept {
   Vec6 currents;
   for (std::size_t i = 0; i < kLegs; ++i) currents(static_cast<Eigen::Index>(i)) = current(i);
   if (hydraulic_) {
+    wear();
     hydraulic_->advance(currents, dt);
   } else {
     const double decay = std::exp(-dt / config_.actuator.tau);
@@ -229,6 +233,34 @@ bool Plant::now(const Cue& cue, std::int64_t duration) const noexcept {
   const std::int64_t began = cue.segment < 0 ? 0 : began_[static_cast<std::size_t>(cue.segment)];
   if (began == kNever || now_ - began < cue.after) return false;
   return now_ - began - cue.after < duration;
+}
+
+/// Faults of hydraulic legs come and go.
+void Plant::wear() noexcept {
+  bool changed = false;
+  for (std::size_t i = 0; i < leg_faults_.size(); ++i) {
+    const bool there = now(leg_faults_[i].cue, leg_faults_[i].duration);
+    changed = changed || there != worn_[i];
+    worn_[i] = there;
+  }
+  if (!changed) return;
+  for (int leg = 0; leg < kLegs; ++leg) {
+    HydraulicLegModel model = config_.hydraulic->leg;
+    for (std::size_t i = 0; i < leg_faults_.size(); ++i) {
+      const FaultEvent& event = leg_faults_[i];
+      if (!worn_[i] || (event.fault != Fault::kSupplyFalls && event.index != leg)) continue;
+      switch (event.fault) {
+        case Fault::kSupplyFalls: model.oil.supply *= event.amount; break;
+        case Fault::kLegLeaks: model.oil.outside += event.amount; break;
+        case Fault::kAirInOil: model.oil.bulk_modulus *= event.amount; break;
+        case Fault::kLegSticks: model.seals.coulomb = model.seals.breakaway = event.amount; break;
+        case Fault::kSealWorn: model.oil.leak += event.amount; break;
+        case Fault::kValveStuck: model.valve.stuck = true; break;
+        default: break;
+      }
+    }
+    hydraulic_->change(leg, model);
+  }
 }
 
 /// [A] through a valve.

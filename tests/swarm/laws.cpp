@@ -39,7 +39,14 @@ Laws::Laws(const Experiment& experiment, const std::string& only)
       period_(c_.periodSeconds()),
       count_(c_.legs.scale.maxCoeff()),
       L_home_(legLengths(c_.geometry, c_.geometry.fromHome(Pose()))),
-      only_(only) {}
+      only_(only) {
+  if (!experiment.plant.hydraulic || c_.resonance.frequency == 0.0) return;
+  swings_ = 1.0 / c_.resonance.frequency;
+  const plant::HydraulicLegModel& leg = experiment.plant.hydraulic->leg;
+  const plant::CylinderModel& c = leg.cylinder;
+  const double middle = leg.oil.hoses + 0.5 * c.bore * (c.length_max - c.length_min);
+  slips_ = 2.0 * leg.seals.breakaway * middle / (leg.oil.bulk_modulus * c.bore * c.bore);
+}
 
 void Laws::broken(const std::string& law, const std::string& what) {
   if (!finding_ && (only_.empty() || only_ == law)) finding_ = Finding{law, tick_, what};
@@ -292,8 +299,12 @@ void Laws::follow(std::int64_t time, const plant::Truth& truth, const Taken& tak
   if (stopped && (!frozen_ || anchor_ != before)) {  // another stop, of which this is heard first
     frozen_time_ = time;
     const Vec6 from = truth.legs.L - anchor_;
-    // The servo's own: of a speed that it has to lose, and of a step that it has to make.
-    const Vec6 overshoot = Vec6::Constant(2.0 * count_) + 0.010 * truth.legs.L_dot.cwiseAbs() +
+    // The servo's own: of a speed that it has to lose, and of a step that it has to make. What
+    // gives way swings on, and six modes add up in a leg.
+    const double modes = std::sqrt(6.0) * swings_;
+    const Vec6 overshoot = Vec6::Constant(2.0 * count_ + slips_) +
+                           (0.010 + modes) * truth.legs.L_dot.cwiseAbs() +
+                           modes * swings_ * truth.legs.L_ddot.cwiseAbs() +
                            overshootOfAStep(c_.servo) * from.cwiseAbs();
     frozen_low_ = from.cwiseMin(0.0) - overshoot;
     frozen_high_ = from.cwiseMax(0.0) + overshoot;
@@ -305,9 +316,13 @@ void Laws::follow(std::int64_t time, const plant::Truth& truth, const Taken& tak
 void Laws::frozen(std::int64_t time, const plant::Truth& truth) {
   const Vec6 off = truth.legs.L - anchor_;
   if (time - engaged_time_ > kSecond / 2) return;  // nobody commands any more
-  if (!((off - frozen_high_).maxCoeff() <= 0.0 && (frozen_low_ - off).maxCoeff() <= 0.0))
-    broken("rest", fmt::format("{:.2f} s after a stop {} beyond the last checked lengths",
-                               static_cast<double>(time - frozen_time_) * 1e-9, legText(off)));
+  const Vec6 beyond = (off - frozen_high_).cwiseMax(frozen_low_ - off);
+  if (!(beyond.maxCoeff() <= 0.0))
+    broken("rest",
+           fmt::format("{:.2f} s after a stop {} beyond what a stop takes, {} off the last checked "
+                       "lengths",
+                       static_cast<double>(time - frozen_time_) * 1e-9,
+                       legText(beyond.cwiseMax(0.0)), legText(off)));
   if (time - frozen_time_ > kSecond && !(off.cwiseAbs().maxCoeff() <= 2.0 * count_))
     broken("rest", fmt::format("stopped, and {} from the last checked lengths", legText(off)));
 }
@@ -328,7 +343,9 @@ void Laws::alone(std::int64_t time, const plant::Truth& truth) {
   const double park_time = static_cast<double>(watchdog.park_time) * kSecondPerNanosecond;
   const Vec6 way = (anchor_ - L_home_).cwiseAbs();
   // A leg takes a count at the servo's pace; one that was on its way takes a moment to stop.
-  const double pace = 2.0 * count_ * c_.servo.extend.maxCoeff();
+  // One that gives way swings by what it slips.
+  const double jolt = swings_ > 0.0 ? (slips_ + count_) / swings_ : 0.0,
+               pace = 2.0 * count_ * c_.servo.extend.maxCoeff() + jolt;
   const bool stays = loops_open_ && time - loop_opened_ > kSecond / 2;
   const Vec6 most = Vec6::Constant(pace) + (stays ? 0.0 : 1.3 / park_time) * way;
   const Vec6 speed = truth.legs.L_dot.cwiseAbs();

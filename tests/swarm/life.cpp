@@ -84,7 +84,20 @@ std::vector<std::string> drawSettings(Dice& dice, const Scenario& scenario) {
     put("controller.period_ns", dice.of(kPeriods));
   }
   maybe(0.3, "sensor.readings_per_tick", "4");
-  maybe(0.2, "legs.filters", "outputs");
+  // The cylinders of config/ves.yaml are none of a desk's.
+  if (scenario.name != std::string_view("arm_on_desk") && dice.chance(0.2)) {
+    put("legs.model", "hydraulic");
+    put("legs.hydraulic.circuit", dice.chance(0.7) ? "three_way" : "four_way");
+    maybe(0.3, "legs.hydraulic.bulk_modulus_mpa", "690");
+    maybe(0.3, "legs.hydraulic.play_m", "0.0001");
+    if (dice.chance(0.3)) {
+      put("legs.hydraulic.coulomb_n", "500");
+      put("legs.hydraulic.breakaway_n", "750");
+    }
+    maybe(0.3, "legs.hydraulic.reading_noise_m", "0.00002");
+  } else {
+    maybe(0.25, "legs.filters", "outputs");
+  }
   maybe(0.2, "sensor.noise", "false");
   maybe(0.3, "gravity_m_per_s2", "0");
   if (dice.chance(0.3))

@@ -22,8 +22,13 @@ enum class Fault {
   kLegFrozen,      // leg `index` keeps its reading
   kLegJump,        // leg `index` reads `amount` [count] more
   kLegOutOfRange,  // leg `index` reads what no 14-bit counter can
-  kValveStuck,     // the valve of leg `index` stays shut
+  kValveStuck,     // the valve of leg `index` stays shut; a hydraulic one where it is
   kRunaway,        // the valve of leg `index` stays open
+  kSupplyFalls,    // to the share `amount`; hydraulic legs, as all down to kSealWorn
+  kLegLeaks,       // leg `index` from its bore to the outside, `amount` [m^3/s/Pa]
+  kAirInOil,       // of leg `index`: its bulk modulus is the share `amount`
+  kLegSticks,      // the seals of leg `index` rub with `amount` [N]
+  kSealWorn,       // of the piston of leg `index`: oil gets past it, `amount` [m^3/s/Pa]
   kJointsLost,     // the robot's joint angles are NaN
   kLost,           // samples do not arrive
   kLate,           // samples arrive `amount` calls later
@@ -34,6 +39,11 @@ enum class Fault {
 };
 
 std::string_view name(Fault fault) noexcept;
+
+/// Of the cylinders, and of those that feel their load.
+constexpr bool isHydraulic(Fault fault) noexcept {
+  return fault >= Fault::kSupplyFalls && fault <= Fault::kSealWorn;
+}
 
 struct FaultEvent {
   Cue cue;

@@ -40,9 +40,10 @@ struct ValveModel {
   double opening = 0.0;    // [A] of either edge at null; negative: both are closed so far
   double limit = 0.0;      // [A] at most
   double null = 0.0;       // [A] of the spool without current, as its screw is set
+  bool stuck = false;      // where it is
   // Dynamic pressure feedback: what the load's pressure has changed by of late closes it.
-  double feedback = 0.0;         // [A/Pa]
-  double feedback_time = 0.03;   // [s] of its high-pass
+  double feedback = 0.0;        // [A/Pa]
+  double feedback_time = 0.03;  // [s] of its high-pass
 };
 
 struct OilModel {
@@ -50,6 +51,7 @@ struct OilModel {
   double bulk_modulus = 0.0;  // [Pa] beta
   double hoses = 0.0;         // [m^3] that each chamber has where its piston is at its end
   double leak = 0.0;          // [m^3/s/Pa] past the piston
+  double outside = 0.0;       // [m^3/s/Pa] from the bore to the floor
 };
 
 struct SealModel {
@@ -100,6 +102,10 @@ class HydraulicLeg {
   HydraulicLeg(const HydraulicLegModel& model, double length, double load) noexcept;
 
   SecondOrderHold prepare(double dt) const noexcept;
+
+  /// Another leg from now on, with the lengths, pressures and spool of this one: it has a fault.
+  /// Its energy is another's.
+  void become(const HydraulicLegModel& model) noexcept;
 
   /// Its joints move to `length` [m] apart at a constant speed while `current` [A] is held;
   /// `spool` prepared for the time dt [s] that this takes.

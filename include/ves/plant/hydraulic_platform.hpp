@@ -60,6 +60,10 @@ class HydraulicPlatform {
   const BodyMotion& motion() const noexcept { return P_; }  // accelerations: of the last step
   Vec6 cylinders() const noexcept;                          // [m] lengths, as they are measured
   Vec6 forces() const noexcept;                             // [N] pushing
+  /// Leg i from now on; HydraulicLeg::become().
+  void change(int i, const HydraulicLegModel& model) noexcept {
+    legs_[static_cast<std::size_t>(i)].become(model);
+  }
   const HydraulicLeg& leg(int i) const { return legs_[static_cast<std::size_t>(i)]; }
 
   /// [J] kinetic and potential, of plate and locked load, and stored in the legs.

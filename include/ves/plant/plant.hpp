@@ -135,6 +135,7 @@ class Plant {
   void moveActuators(std::int64_t to) noexcept;
   bool now(const Cue& cue, std::int64_t duration) const noexcept;
   double current(std::size_t leg) const noexcept;
+  void wear() noexcept;
   void readTransducers() noexcept;
   void stepMechanics() noexcept;
   void readSensor() noexcept;
@@ -188,7 +189,9 @@ class Plant {
   std::array<std::int64_t, kMaxSegments + 1> began_{};  // [ns] each segment; kNever: not yet
   std::int64_t next_robot_event_ = kNever;              // [ns]
   std::vector<Injector> injectors_;                     // one a fault
-  std::vector<FaultEvent> valve_faults_;                // those that are not of samples
+  std::vector<FaultEvent> valve_faults_;                // those that are not of samples,
+  std::vector<FaultEvent> leg_faults_;                  // and of hydraulic legs,
+  std::vector<bool> worn_;                              // of which these are there
   std::vector<bool> robot_event_done_;
   int refused_events_ = 0;
   MovingRobot robot_;  // all rigid plates counted into its base
