@@ -45,7 +45,7 @@ Laws::Laws(const Experiment& experiment, const std::string& only)
   const plant::HydraulicLegModel& leg = experiment.plant.hydraulic->leg;
   const plant::CylinderModel& c = leg.cylinder;
   const double middle = leg.oil.hoses + 0.5 * c.bore * (c.length_max - c.length_min);
-  slips_ = 2.0 * leg.seals.breakaway * middle / (leg.oil.bulk_modulus * c.bore * c.bore);
+  slips_ = c.play + 2.0 * leg.seals.breakaway * middle / (leg.oil.bulk_modulus * c.bore * c.bore);
 }
 
 void Laws::broken(const std::string& law, const std::string& what) {

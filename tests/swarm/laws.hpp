@@ -80,8 +80,9 @@ class Laws {
   const ControllerConfig& c_;
   PathChecks checks_;
   double period_, count_;              // [s], [m]
-  double swings_ = 0.0, slips_ = 0.0;  // [s, m] legs that give way: 1/w of the lowest mode, and how
-                                       // far the oil is bent when seals break away
+  // Legs that give way: 1/w of the lowest mode; their play, and how far their oil is bent when seals
+  // break away.
+  double swings_ = 0.0, slips_ = 0.0;  // [s], [m]
   Vec6 L_home_;
   const std::string& only_;
   std::int64_t tick_ = 0;

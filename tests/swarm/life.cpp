@@ -88,7 +88,8 @@ std::vector<std::string> drawSettings(Dice& dice, const Scenario& scenario) {
   if (scenario.name != std::string_view("arm_on_desk") && dice.chance(0.2)) {
     put("legs.model", "hydraulic");
     put("legs.hydraulic.circuit", dice.chance(0.7) ? "three_way" : "four_way");
-    maybe(0.3, "legs.hydraulic.bulk_modulus_mpa", "690");
+    // On the Shuttle's arm soft oil diverges within a second; what then stops is no longer a law's.
+    if (!scenario.arm) maybe(0.3, "legs.hydraulic.bulk_modulus_mpa", "690");
     maybe(0.3, "legs.hydraulic.play_m", "0.0001");
     if (dice.chance(0.3)) {
       put("legs.hydraulic.coulomb_n", "500");
