@@ -14,6 +14,7 @@ std::string name(Verdict verdict) {
   switch (verdict) {
     case Verdict::kAgrees: return "agrees";
     case Verdict::kDiffers: return "differs";
+    case Verdict::kRange: return "a range";
     case Verdict::kCannotTell: return "cannot be judged";
   }
   return "";
@@ -39,6 +40,7 @@ Claims::Claims(const std::filesystem::path& file) : file_(file.string()) {
       }
       ranges.finish();
     }
+    if (s.has("range") && s.flag("range")) entry.claim.verdict = Verdict::kRange;
     s.finish();
   }
   root.finish();

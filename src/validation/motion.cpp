@@ -30,8 +30,6 @@ void trajectories(Reproduction& r) {
                     {"linear_retracting_mm", linear(servo.retract(0)) * kMilli},
                     {"extending_share", extending / linear(servo.extend(0))},
                     {"retracting_share", retracting / linear(servo.retract(0))}});
-  r.claim("z_hardware",
-          {{"extending_mm", extending * kMilli}, {"retracting_mm", retracting * kMilli}});
   auto panels = tracking(z.series, SegmentKind::kTrajectory, {2});
   panels.push_back({kSinceSegment,
                     "z error [mm]",
@@ -43,8 +41,6 @@ void trajectories(Reproduction& r) {
   const Reproduction::Run alpha = r.run("alpha_sine");
   const double most = summarise(alpha.series, alpha.result)["alpha_error_max_rad"].get<double>();
   r.numbers["alpha_sine"]["alpha_error_max_rad"] = most;
-  r.claim("alpha_hardware",
-          {{"error_deg", most / kDegree}, {"percent", 100.0 * most / (20 * kDegree)}});
   panels = tracking(alpha.series, SegmentKind::kTrajectory, {3});
   panels.push_back({kSinceSegment,
                     "alpha error [deg]",
@@ -58,14 +54,10 @@ void freeDecay(Reproduction& r) {
   r.page.section("4.2.2 Free decay of Table 4.1");
   const Reproduction::Run run = r.run("free_decay");
   Numbers summary = summarise(run.series, run.result);
-  Quantities largest;
   for (const Coordinate& c : kCoordinates) {
     const std::string key = fmt::format("{}_error_max_{}", c.name, c.unit);
-    const double error = summary[key].get<double>();
-    r.numbers["free_decay"][key] = error;
-    largest[fmt::format("{}_{}", c.name, c.shown_unit)] = error * c.shown;
+    r.numbers["free_decay"][key] = summary[key].get<double>();
   }
-  r.claim("free_decay", largest);
   const char* const command = "./ves run free_decay --lockstep";
   r.page.figure("Figure 4.8: commanded and actual pose.",
                 tracking(run.series, SegmentKind::kAdmittance, {0, 1, 2, 3, 4, 5}), command);

@@ -137,7 +137,8 @@ void Page::table(const std::vector<std::string>& header,
 std::string Page::html(const std::string& title, const std::string& lead) const {
   const std::vector<Claim> all = claims();
   std::string counts;
-  for (const Verdict v : {Verdict::kAgrees, Verdict::kDiffers, Verdict::kCannotTell}) {
+  for (const Verdict v :
+       {Verdict::kAgrees, Verdict::kDiffers, Verdict::kRange, Verdict::kCannotTell}) {
     const auto n =
         std::count_if(all.begin(), all.end(), [v](const Claim& c) { return c.verdict == v; });
     if (n) counts += fmt::format("{}{} {}", counts.empty() ? "" : ", ", n, badge(v));

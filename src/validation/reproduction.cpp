@@ -128,7 +128,7 @@ Chapter4 reproduceChapter4(const fs::path& config, const fs::path& folder, int w
                                   static_cast<std::size_t>(workers));
   Reproduction r(config, folder, progress);
   constexpr void (*kSections[])(Reproduction&) = {
-      sensorSection,    ratesSection,  motionSection,       shuttleArmSection,
+      sensorSection,    ratesSection,  motionSection,       imperfectSection, shuttleArmSection,
       stabilitySection, massesSection, compensationSection, contactSection};
   r.parts(std::size(kSections), [&](Reproduction& piece, std::size_t i) { kSections[i](piece); });
   if (const std::vector<std::string> open = r.openClaims(); !open.empty())

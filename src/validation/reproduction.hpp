@@ -117,6 +117,7 @@ std::string letGo(const CoupledMode& mode);
 void sensorSection(Reproduction& r);        // 4.1, calibration of 2.3
 void ratesSection(Reproduction& r);         // 2.3, 2.4
 void motionSection(Reproduction& r);        // 4.2
+void imperfectSection(Reproduction& r);     // 4.2 on hydraulic legs
 void shuttleArmSection(Reproduction& r);    // 4.3
 void stabilitySection(Reproduction& r);     // Appendix E
 void massesSection(Reproduction& r);        // Appendix B

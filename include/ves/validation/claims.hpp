@@ -14,6 +14,7 @@ namespace ves {
 enum class Verdict {
   kAgrees,
   kDiffers,
+  kRange,      // over substitutes that stand for what the report measured
   kCannotTell  // what decides it is a substitute, or is not in the report
 };
 
