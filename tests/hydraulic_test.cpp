@@ -4,6 +4,7 @@
 // energy; and that all of it vanishes where the load does.
 #include <gtest/gtest.h>
 
+#include "support/momentum.hpp"
 #include "support/rig.hpp"
 #include "ves/math/dense.hpp"
 #include "ves/plant/nominal_servo.hpp"
@@ -512,6 +513,51 @@ Apart apart(const Experiment& a, const Experiment& b) {
   }
   out.rms = std::sqrt(sum / static_cast<double>(went[0].size()));
   return out;
+}
+
+TEST(HydraulicPlant, LegsGivePlateAndRobotTheirMomentum) {
+  // Horizontally nothing else pushes: the legs' impulse is the momentum of all that they carry. The
+  // robot's by differences of its poses.
+  const Experiment e =
+      experiment("puma_on_table_4_1", {"legs.model=hydraulic", "sensor.noise=false"});
+  const Geometry& g = e.plant.geometry;
+  for (const RobotMove& move : {RobotMove{1, -0.8, 0.6}, RobotMove{0, 1.0, 0.6}}) {
+    Plant plant(e.plant);
+    MovingRobot robot(carried(e.plant.payload), e.plant.task.initial_joints);
+    LegCommand stand;
+    stand.engaged = true;
+    const Vec6 L = legLengths(g, g.fromHome(e.plant.initial_pose));
+    for (int i = 0; i < kLegs; ++i)
+      stand.counts[static_cast<std::size_t>(i)] = e.plant.transducer.count(L(i));
+    stand.rest = stand.counts;
+    constexpr std::int64_t kBegin = 200'000'000, kStep = 100'000;  // [ns]
+    plant.command(stand);
+    plant.advance(kBegin);
+    ASSERT_TRUE(plant.moveRobot(move) && robot.begin(move, kBegin));
+    const auto q = [&](double t) { return robot.at(std::llround(t * 1e9)).q; };
+    const auto momentum = [&](double t) -> Vec3 {
+      const BodyMotion& P = plant.hydraulics()->motion();
+      const Transform X_IL0 = P.X * e.plant.payload.X_PL0();
+      const Vec6 arm = test::momentum(
+          robot.model(), [&](double) { return X_IL0; }, q, t, 1e-3);
+      const double carried_mass = compositeBody(robot.model(), q(t)).mass;
+      return arm.head<3>() + (e.plant.hydraulic->plate_P.mass + carried_mass) * P.v;
+    };
+    const Vec3 before = momentum(0.2 - 0.01);
+    Vec3 impulse = Vec3::Zero();
+    double largest = 0.0;
+    for (std::int64_t now = kBegin; now < kBegin + 400'000'000; now += kStep) {
+      plant.advance(now + kStep);
+      const HydraulicPlatform& platform = *plant.hydraulics();
+      const Vec6 wrench = legLines(g, platform.motion().X).J.transpose() * platform.forces();
+      impulse += wrench.head<3>() * 1e-9 * static_cast<double>(kStep);
+      if ((now - kBegin) % 50'000'000 != 0) continue;
+      const Vec3 gained = momentum(1e-9 * static_cast<double>(now + kStep)) - before;
+      largest = std::max(largest, gained.head<2>().norm());
+      EXPECT_LT((impulse - gained).head<2>().norm(), 0.15) << now;
+    }
+    EXPECT_GT(largest, 3.0);  // [N s]
+  }
 }
 
 TEST(HydraulicPlant, IsTheIdealOneWhereItIsStiffAndNoLoadShows) {

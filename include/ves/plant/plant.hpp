@@ -125,6 +125,10 @@ class Plant {
   /// As of the last step of the mechanics; now, right after sample().
   const Truth& truth() const noexcept { return truth_; }
   std::int64_t time() const noexcept { return now_; }  // [ns]
+  /// The platform on legs that feel their load; null on ideal ones.
+  const HydraulicPlatform* hydraulics() const noexcept {
+    return hydraulic_ ? &*hydraulic_ : nullptr;
+  }
   /// [-] events that the robot could not begin, as it was elsewhere or its hand not free.
   int refusedEvents() const noexcept { return refused_events_; }
 
