@@ -322,7 +322,8 @@ PlatformLoad Plant::platformLoad(const Wrench& further_So_S) noexcept {
 }
 
 /// What touches the tool while it goes from where it was to where it is, as the sensor feels it:
-/// F_So_S. The legs do not feel it, as they feel no other load.
+/// F_So_S. Ideal legs do not feel it, as they feel no other load; hydraulic ones get it with
+/// theirs.
 Wrench Plant::meetWorld(double dt) noexcept {
   const World& world = *config_.task.world;
   const FrameMotion now = toolMotion();

@@ -79,9 +79,9 @@ class Laws {
   const Experiment& experiment_;
   const ControllerConfig& c_;
   PathChecks checks_;
-  double period_, count_;              // [s], [m]
-  // Legs that give way: 1/w of the lowest mode; their play, and how far their oil is bent when seals
-  // break away.
+  double period_, count_;  // [s], [m]
+  // Legs that give way: 1/w of the lowest mode; their play, and how far their oil is bent when
+  // seals break away.
   double swings_ = 0.0, slips_ = 0.0;  // [s], [m]
   Vec6 L_home_;
   const std::string& only_;

@@ -15,8 +15,9 @@
 //   play     of the joints: a spring as wide as the play, until the joint is seated
 //
 // A three-way valve meters the piston's side and leaves the rod's at supply pressure; a four-way
-// valve meters both. Either gives the report's two gains, by its ratio of areas. Valid while the
-// supply's pressure is what it is called; the return's is zero. What is below zero is a void.
+// valve meters both. Either gives the report's two gains, by its ratio of areas. The supply keeps
+// its pressure until a fault changes it (become()); the return's is zero. What is below zero is a
+// void.
 //
 // Energy: the supply gives, the oil, the bristles and the stops store, orifices, leak and seals
 // dissipate; each is counted for itself. Source of the oil's energy: rho = rho_0 e^{p/beta}, so
