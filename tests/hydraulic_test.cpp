@@ -530,7 +530,7 @@ TEST(HydraulicPlant, LegsGivePlateAndRobotTheirMomentum) {
     for (int i = 0; i < kLegs; ++i)
       stand.counts[static_cast<std::size_t>(i)] = e.plant.transducer.count(L(i));
     stand.rest = stand.counts;
-    constexpr std::int64_t kBegin = 200'000'000, kStep = 100'000;  // [ns]
+    constexpr std::int64_t kBegin = 200'000'000, kInterval = 100'000;  // [ns]
     plant.command(stand);
     plant.advance(kBegin);
     ASSERT_TRUE(plant.moveRobot(move) && robot.begin(move, kBegin));
@@ -546,13 +546,13 @@ TEST(HydraulicPlant, LegsGivePlateAndRobotTheirMomentum) {
     const Vec3 before = momentum(0.2 - 0.01);
     Vec3 impulse = Vec3::Zero();
     double largest = 0.0;
-    for (std::int64_t now = kBegin; now < kBegin + 400'000'000; now += kStep) {
-      plant.advance(now + kStep);
+    for (std::int64_t now = kBegin; now < kBegin + 400'000'000; now += kInterval) {
+      plant.advance(now + kInterval);
       const HydraulicPlatform& platform = *plant.hydraulics();
       const Vec6 wrench = legLines(g, platform.motion().X).J.transpose() * platform.forces();
-      impulse += wrench.head<3>() * 1e-9 * static_cast<double>(kStep);
+      impulse += wrench.head<3>() * 1e-9 * static_cast<double>(kInterval);
       if ((now - kBegin) % 50'000'000 != 0) continue;
-      const Vec3 gained = momentum(1e-9 * static_cast<double>(now + kStep)) - before;
+      const Vec3 gained = momentum(1e-9 * static_cast<double>(now + kInterval)) - before;
       largest = std::max(largest, gained.head<2>().norm());
       EXPECT_LT((impulse - gained).head<2>().norm(), 0.15) << now;
     }
