@@ -7,6 +7,7 @@
 namespace ves::app {
 
 int collectCommand(int argc, char** argv);
+int acceptCommand(int argc, char** argv);
 int commissionCommand(int argc, char** argv);
 int compareCommand(int argc, char** argv);
 int controllerCommand(int argc, char** argv);

@@ -40,14 +40,14 @@ int commission(RunnerOptions& options, const CommissioningOptions& wanted) {
                                        scenario.name)));
   options.belief.belief = file;  // what would be refused is refused now
   const Experiment believing = options.load();
-  const std::vector<CommissioningTable> tables =
+  const std::vector<Table> tables =
       tablesOf(series, c, found, forecastError(scenario, believing, found));
   const std::string use =
       fmt::format("./ves run {} --belief {}", options.scenario, file.lexically_normal().string());
   Page page;
   page.section("To use it");
   page.text(use);
-  for (const CommissioningTable& table : tables) {
+  for (const Table& table : tables) {
     page.section(table.title);
     if (!table.rows.empty()) page.table(table.header, table.rows);
     if (!table.note.empty()) page.text(table.note);
@@ -57,7 +57,7 @@ int commission(RunnerOptions& options, const CommissioningOptions& wanted) {
                       fmt::format("{:.0f} s of the machine's time, {}; {}", result.simulated,
                                   dateText(std::time(nullptr)), describeBuild())));
   if (!options.quiet) {
-    for (const CommissioningTable& table : tables) {
+    for (const Table& table : tables) {
       printTable(table.title, table.header, table.rows);
       if (!table.note.empty()) fmt::print("  {}\n\n", table.note);
     }

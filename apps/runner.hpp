@@ -24,6 +24,7 @@ struct RunnerOptions : Options {
   bool two_processes = false;
   bool plots = true;
   bool view = false;
+  bool on_bus = false;  // prepareBus() was here
 
   void addOut(CLI::App& cli) {
     cli.add_option("--out", out, "folder for the results; a new one in ves-runs by default");
@@ -65,6 +66,7 @@ inline LaunchOptions prepareFolder(RunnerOptions& options, const Experiment& exp
 
 /// A bus that works; `alone`: nobody else needs to be on it.
 inline void prepareBus(RunnerOptions& options, bool alone) {
+  if (std::exchange(options.on_bus, true)) return;
   if (alone && !options.private_bus && options.join.empty() && !busWorks(options.process.url)) {
     fmt::print(stderr, "multicast does not come back on this machine: using a private bus\n");
     options.private_bus = true;
@@ -126,7 +128,8 @@ class ViewBeside {
 
 /// From start to its log, with a line that tells how far it is.
 inline RunResult execute(RunnerOptions& options, const Experiment& experiment,
-                         LaunchOptions& launch) {
+                         LaunchOptions& launch, bool tells = true) {
+  tells = tells && !options.quiet;
   const bool one_process =
       options.process.lockstep && !options.two_processes && !options.process.pace;
   catchSignals();
@@ -138,21 +141,20 @@ inline RunResult execute(RunnerOptions& options, const Experiment& experiment,
     result = runLockstep(experiment, &writer, [&](const TickState& state) {
       double x[6];
       Vec6::Map(x) = state.motion.x;
-      if (!options.quiet) progress.show(state.phase, state.segment, state.tick, x);
+      if (tells) progress.show(state.phase, state.segment, state.tick, x);
       return stop_requested ? Order{Request::kStop, {}, {}} : Order();
     });
   } else {
     if (options.view)
       view.emplace(options.process.url,
                    launch.scenario.parent_path());  // browsers are not on a private bus
-    prepareBus(options, true);
+    prepareBus(options, launch.plant);
     if (view) view->start();
     launch.process.start = true;
     result = runProcesses(
         experiment, launch,
         [&](const state_t& s) {
-          if (!options.quiet)
-            progress.show(static_cast<Phase>(s.phase), s.segment, s.header.sequence, s.x);
+          if (tells) progress.show(static_cast<Phase>(s.phase), s.segment, s.header.sequence, s.x);
         },
         [] { return stop_requested != 0; });
   }

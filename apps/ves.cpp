@@ -27,6 +27,8 @@ constexpr Command kCommands[] = {
     {"collect", "variables of a log as CSV (--select, --rate, --list)", collectCommand},
     {"plot", "columns of a log as a picture (--select)", plotCommand},
     {"commission", "what a machine is: one command, one belief file, one page", commissionCommand},
+    {"accept", "what a motion platform does, as AGARD-AR-144 measures it; limits kept or not",
+     acceptCommand},
     {"compare", "runs side by side: configurations, results, curves", compareCommand},
     {"view", "a recorded run in three dimensions, as one file for a browser", viewCommand},
     {"keys", "what scenario files may say, with unit, range and default", keysCommand},

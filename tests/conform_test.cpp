@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include <fstream>
 #include <functional>
 #include <set>
 
@@ -188,6 +189,22 @@ TEST_F(PythonMachine, TheTemplateKeepsAllAndMovesWhileThirtyPercentIsLost) {
   Process machine = python("apps/examples/machine.py", {"--rate", "500"}, "0.3");
   const test::Output all = test::sh(app("conform") + "z_sine --move " + patient());
   EXPECT_EQ(all.status, 0) << all.text;
+}
+
+TEST_F(PythonMachine, TheTemplateIsMeasured) {
+  // Its legs follow with a lag of the first order, of 0.05 s.
+  enterPrivateBus();
+  Process machine = python("apps/examples/machine.py", {"--rate", "200"});
+  const test::Output all = test::sh(app("accept") +
+                                    "z_sine --move --coordinates z --tests sines --frequencies 2 "
+                                    "--amplitudes 1 " +
+                                    patient() + out("a"));
+  ASSERT_EQ(all.status, 0) << all.text;
+  std::ifstream csv(file("a/accept.csv"));
+  double gain = NAN;
+  for (std::string line; std::getline(csv, line);)
+    if (line.starts_with("z,gain,1,")) gain = std::stod(line.substr(9));
+  EXPECT_NEAR(gain, 1.0 / std::hypot(1.0, 2.0 * M_PI * 2.0 * 0.05), 0.05);
 }
 
 struct Wrong {

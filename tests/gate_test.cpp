@@ -331,6 +331,17 @@ TEST(Gate, NothingOfTheSimulatedMachineChangesItsVerdict) {
   const auto as_believed = verdict({});
   for (const char* key : {"gain_extend", "gain_retract", "tau", "sensor_cutoff", "mass", "center"})
     EXPECT_EQ(verdict({fmt::format("plant_mismatch={{{}: 0.5}}", key)}), as_believed) << key;
+  // On oil a verdict takes seconds: what it is made of.
+  const auto resonance = [](const std::string& key) {
+    std::vector<std::string> set = {"legs.model=hydraulic"};
+    if (!key.empty()) set.push_back(fmt::format("plant_mismatch={{{}: 0.8}}", key));
+    const Resonance r = test::experiment("puma_on_table_4_1", set).controller.resonance;
+    return std::tuple(r.frequency, r.damping, r.feedback, r.feedback_time);
+  };
+  EXPECT_GT(std::get<0>(resonance("")), 0.0);
+  for (const char* key :
+       {"gain_extend", "tau", "bulk_modulus", "friction", "opening", "mass", "center"})
+    EXPECT_EQ(resonance(key), resonance("")) << key;
 }
 
 TEST(Gate, LooksAtTheServosThatWereIdentified) {

@@ -49,6 +49,7 @@ const std::map<std::string, Names> kMayInclude = [] {
   add("export", {}, "evaluation");
   add("page", {}, "evaluation");
   add("validation", {"page"}, "pictures");
+  add("acceptance", {}, "validation");
   add("doctor", {}, "run");
   add("sweep", {}, "evaluation");
   add("faults", {}, "run");

@@ -263,6 +263,17 @@ void readPlantMismatch(Section s, plant::PlantConfig& p) {
   factor("gain_retract", p.actuator.gain_retract);
   factor("tau", p.actuator.tau);
   if (p.hydraulic && s.has("tau")) p.hydraulic->leg.valve.frequency /= s.number("tau", 0.01, 100.0);
+  const auto ofCylinders = [&](const char* key, std::initializer_list<double*> values) {
+    if (!s.has(key)) return;
+    const double by = s.number(key, 0.01, 100.0);
+    if (!p.hydraulic) s.fail(key, "is of cylinders, want legs.model: hydraulic");
+    for (double* value : values) *value *= by;
+  };
+  plant::HydraulicLegModel none;
+  plant::HydraulicLegModel& leg = p.hydraulic ? p.hydraulic->leg : none;
+  ofCylinders("bulk_modulus", {&leg.oil.bulk_modulus});
+  ofCylinders("friction", {&leg.seals.coulomb, &leg.seals.breakaway, &leg.seals.bristle});
+  ofCylinders("opening", {&leg.valve.opening});
   factor("sensor_cutoff", p.sensor.cutoff);
   const double mass = s.has("mass") ? s.number("mass", 0.01, 100.0) : 1.0;
   const double center = s.has("center") ? s.number("center", 0.0, 10.0) : 1.0;

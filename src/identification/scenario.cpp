@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "ves/config/urdf.hpp"
+#include "ves/control/gravity_compensation.hpp"
 #include "ves/math/dense.hpp"
 
 namespace ves {
@@ -23,6 +24,23 @@ StaticSetup staticSetup(const ControllerConfig& controller) {
   const Payload& payload = controller.payload;
   return {carried(payload), inverse(payload.X_PS) * payload.X_PL0(), payload.X_PS.R,
           inverse(controller.sensor.C_proc), controller.gravity};
+}
+
+double accelerationRoom(const ControllerConfig& c, const JointVector& q, int coordinate) {
+  constexpr double kFullScale = 32768.0, kRoom = 0.6;  // [count], [-]
+  const Mat3 R_IP = Mat3::Identity();
+  const Mat6 counts = inverse(wrenchPerCount(c.sensor, R_IP));
+  const RigidBody load_P =
+      combine(RigidBody{}, c.payload.X_PL0(), compositeBody(carried(c.payload), q));
+  const Wrench weight =
+      gravityCompensation(c.payload, R_IP, staticWrench(c.payload, q, R_IP, c.gravity));
+  const Vec6 stands = counts * weight.stacked(),
+             each = counts * spatialMass(load_P).col(coordinate);
+  double most = HUGE_VAL;
+  for (int i = 0; i < 6; ++i)
+    if (each(i) != 0.0)
+      most = std::min(most, (kRoom * kFullScale - std::abs(stands(i))) / std::abs(each(i)));
+  return most;
 }
 
 std::string programOf(const PosePlan& plan, const Experiment& experiment) {

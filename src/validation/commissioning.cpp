@@ -26,23 +26,6 @@ constexpr double kShaking = 2.0;  // [s] each
 constexpr int kFirstShake = 2;    // [-] of the program's segments; home and calibration go before
 constexpr int kShakeCount = static_cast<int>(std::size(kShakes));
 
-/// [m/s^2] that the sensor bears up and down beside the weight, the robot at q and level.
-double bearable(const ControllerConfig& c, const JointVector& q) {
-  constexpr double kFullScale = 32768.0, kRoom = 0.6;  // [count], [-]
-  const StaticSetup setup = staticSetup(c);
-  const auto countsOf = [&](const Vec3& g) -> Vec6 {
-    StaticSetup one = setup;
-    one.g_I = g;
-    return countRegressor(one, q, Vec3::Zero()) * massParameters(setup.robot);
-  };
-  const Vec6 weight = countsOf(c.gravity), unit = countsOf(Vec3::UnitZ());
-  double most = HUGE_VAL;
-  for (int i = 0; i < 6; ++i)
-    if (unit(i) != 0.0)
-      most = std::min(most, (kRoom * kFullScale - std::abs(weight(i))) / std::abs(unit(i)));
-  return most;
-}
-
 /// [m] A sine begins and ends with its full speed, which the legs take up within kTake.
 double amplitudeOf(const Shake& shake, const SafetyLimits& limits, double acceleration) {
   constexpr double kSpeed = 0.5;   // [-] of the legs' limit
@@ -99,7 +82,7 @@ Commissioning commissioningOf(const Experiment& scenario, const CommissioningOpt
   const JointVector start = bare.plant.task.initial_joints;
   const double speed = options.poses.speed;
   JointVector stand = start;  // where the sensor bears most beside the robot's weight
-  double bears = bearable(c, start);
+  double bears = accelerationRoom(c, start, 2);
   const auto beside = [&] {  // [s] arming, home, calibration, shakes, home, and moves between
     constexpr double kEnds = 5.0;
     double time = kEnds + kShaking * kShakeCount + moveTime(bare, start, stand, speed);
@@ -123,10 +106,10 @@ Commissioning commissioningOf(const Experiment& scenario, const CommissioningOpt
         poses.most_seconds = std::max(1.0, poses.most_seconds);
         out.plan = planFewestPoses(setup, combinations, c, start, poses, options.accuracy);
         stand = start;
-        bears = bearable(c, start);
+        bears = accelerationRoom(c, start, 2);
         for (const PosePlan::Attitude& a : out.plan->attitudes)
           for (const JointVector& q : a.q)
-            if (const double one = bearable(c, q); one > bears) {
+            if (const double one = accelerationRoom(c, q, 2); one > bears) {
               bears = one;
               stand = q;
             }
@@ -313,14 +296,13 @@ std::optional<ErrorForecast> forecastError(const Experiment& scenario, const Exp
   return out;
 }
 
-std::vector<CommissioningTable> tablesOf(const Series& series, const Commissioning& commissioning,
-                                         const Commissioned& f,
-                                         const std::optional<ErrorForecast>& forecast) {
-  std::vector<CommissioningTable> out;
+std::vector<Table> tablesOf(const Series& series, const Commissioning& commissioning,
+                            const Commissioned& f, const std::optional<ErrorForecast>& forecast) {
+  std::vector<Table> out;
   if (forecast) {
-    CommissioningTable t{"Expected error of the emulation, rms over the base's travel",
-                         {"", "position", "rotation"},
-                         {}};
+    Table t{"Expected error of the emulation, rms over the base's travel",
+            {"", "position", "rotation"},
+            {}};
     const auto row = [&](const char* when, const EmulationError& e) {
       t.rows.push_back({when, fmt::format("{:.2f} %", 100.0 * e.position),
                         fmt::format("{:.2f} %", 100.0 * e.attitude)});
@@ -337,7 +319,7 @@ std::vector<CommissioningTable> tablesOf(const Series& series, const Commissioni
     out.push_back(std::move(t));
   }
 
-  CommissioningTable room{"Ranges used, from their middle", {"", "most", "want at most"}, {}};
+  Table room{"Ranges used, from their middle", {"", "most", "want at most"}, {}};
   for (const RangeUse& one : f.ranges)
     room.rows.push_back({one.name, fmt::format("{:.0f} %", 100.0 * one.used),
                          fmt::format("{:.0f} %{}", 100.0 * RangeUse::kRoom,
@@ -348,9 +330,9 @@ std::vector<CommissioningTable> tablesOf(const Series& series, const Commissioni
   out.push_back(std::move(room));
 
   if (f.calibration) {
-    CommissioningTable t{"Calibration of the force-torque sensor",
-                         {"channel", "bias [count]", "of a sample", "of the bias"},
-                         {}};
+    Table t{"Calibration of the force-torque sensor",
+            {"channel", "bias [count]", "of a sample", "of the bias"},
+            {}};
     for (int i = 0; i < 6; ++i)
       t.rows.push_back({std::string(wrenchComponent(i).name),
                         fmt::format("{:.2f}", f.calibration->bias(i)),
@@ -359,8 +341,7 @@ std::vector<CommissioningTable> tablesOf(const Series& series, const Commissioni
     out.push_back(std::move(t));
   }
 
-  CommissioningTable masses{
-      "Masses of the robot", {"combination", "found", "deviation", "told"}, {}};
+  Table masses{"Masses of the robot", {"combination", "found", "deviation", "told"}, {}};
   if (f.masses) {
     const SeparableCombinations& c = f.masses->combinations;
     const Eigen::VectorXd told =
@@ -380,7 +361,7 @@ std::vector<CommissioningTable> tablesOf(const Series& series, const Commissioni
   }
   out.push_back(std::move(masses));
 
-  CommissioningTable servo{
+  Table servo{
       "Servos", {"leg", "extending [1/s]", "retracting [1/s]", "tau [ms]", "delay [ms]"}, {}};
   if (f.servo) {
     const auto cell = [&](Vec6 ServoModel::*value, int i, double scale) {
@@ -411,7 +392,7 @@ std::vector<CommissioningTable> tablesOf(const Series& series, const Commissioni
     computing.push_back(1e-6 * static_cast<double>(row.timing.compute_ns));
   }
   if (!late.empty()) {
-    CommissioningTable t{"Timing of the loop", {"[ms]", "median", "worst"}, {}};
+    Table t{"Timing of the loop", {"[ms]", "median", "worst"}, {}};
     const auto row = [&](const char* what, std::vector<double>& values) {
       std::sort(values.begin(), values.end());
       t.rows.push_back({what, fmt::format("{:.3f}", values[values.size() / 2]),

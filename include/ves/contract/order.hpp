@@ -80,7 +80,7 @@ struct Segment {
   double interval = 0.0;  // [s] of a monitor segment, from one sample to the next
 };
 
-inline constexpr int kMaxSegments = 64;
+inline constexpr int kMaxSegments = 128;
 
 /// When something happens: `after` the controller's program reached `segment`.
 struct Cue {

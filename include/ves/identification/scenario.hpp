@@ -10,6 +10,11 @@ namespace ves {
 
 StaticSetup staticSetup(const ControllerConfig& controller);
 
+/// [m/s^2 | rad/s^2] along a coordinate 0..5 that the force sensor bears either way beside the
+/// weight, level and the robot at q, with two fifths of its range to spare; infinite where nothing
+/// is on it.
+double accelerationRoom(const ControllerConfig& controller, const JointVector& q, int coordinate);
+
 /// A fifth-order motion of all joints at once.
 struct TimedMove {
   double start = 0.0, duration = 0.0;    // [s] in its segment

@@ -10,6 +10,7 @@
 
 #include "ves/evaluation/identified.hpp"
 #include "ves/identification/pose_plan.hpp"
+#include "ves/validation/page.hpp"
 
 namespace ves {
 
@@ -74,14 +75,8 @@ std::optional<ErrorForecast> forecastError(const Experiment& scenario, const Exp
                                            const Commissioned& found);
 
 /// What a person reads, on a terminal or a page.
-struct CommissioningTable {
-  std::string title;
-  std::vector<std::string> header;
-  std::vector<std::vector<std::string>> rows;
-  std::string note = {};  // beneath it
-};
-std::vector<CommissioningTable> tablesOf(const Series& series, const Commissioning& commissioning,
-                                         const Commissioned& found,
-                                         const std::optional<ErrorForecast>& forecast);
+std::vector<Table> tablesOf(const Series& series, const Commissioning& commissioning,
+                            const Commissioned& found,
+                            const std::optional<ErrorForecast>& forecast);
 
 }  // namespace ves

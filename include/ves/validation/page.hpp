@@ -11,6 +11,13 @@
 
 namespace ves {
 
+struct Table {
+  std::string title;
+  std::vector<std::string> header;
+  std::vector<std::vector<std::string>> rows;
+  std::string note = {};  // beneath it
+};
+
 /// A self-contained HTML page: style and figures inside, no script, light and dark, prints. All
 /// text is taken as text, not as HTML.
 class Page {

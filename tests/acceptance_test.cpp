@@ -1,0 +1,412 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// The acceptance tests of a platform against machines whose play, lag, delay and noise are drawn,
+// and the one whose servos are equations.
+#include <gtest/gtest.h>
+
+#include <complex>
+#include <fstream>
+#include <random>
+
+#include "support/programs.hpp"
+#include "support/rig.hpp"
+#include "ves/acceptance/acceptance.hpp"
+#include "ves/core/coordinates.hpp"
+#include "ves/math/dense.hpp"
+#include "ves/robot/newton_euler.hpp"
+
+namespace ves {
+namespace {
+
+using namespace std::complex_literals;
+
+#ifdef VES_SANITIZE
+constexpr int kMachines = 8;
+#else
+constexpr int kMachines = 50;
+#endif
+
+Track sampled(double seconds, double period, const std::function<double(double)>& y) {
+  Track out;
+  for (int i = 0; i < std::lround(seconds / period); ++i) {
+    out.t.push_back(100.0 + i * period);
+    out.y.push_back(y(out.t.back()));
+  }
+  return out;
+}
+
+TEST(Measures, FindASineItsHarmonicsAndWhatRemains) {
+  constexpr double kDrift = 1e-3;  // a fourth harmonic is a little of a drift too
+  const double w = 2.0 * M_PI * 3.0;
+  const Track track = sampled(2.0, 0.01, [&](double t) {
+    return 0.4 + 0.02 * (t - 100.0) + 1.5 * std::cos(w * t + 0.7) +
+           0.2 * std::cos(2 * w * t - 1.0) + 0.1 * std::cos(3 * w * t) + 0.05 * std::cos(4 * w * t);
+  });
+  const Sinusoid s = sinusoid(track, 3.0);
+  EXPECT_NEAR(std::abs(s.of[0] - 1.5 * std::exp(0.7i)), 0.0, kDrift);
+  EXPECT_NEAR(std::abs(s.of[1] - 0.2 * std::exp(-1.0i)), 0.0, kDrift);
+  EXPECT_NEAR(std::abs(s.of[2] - 0.1), 0.0, kDrift);
+  EXPECT_NEAR(s.rest, 0.05 / M_SQRT2, kDrift);
+  EXPECT_NEAR(s.peak, 0.35, 0.03);
+}
+
+TEST(Measures, IntervalsOfASineHoldItAsOftenAsTheySay) {
+  std::mt19937 engine(1);
+  std::normal_distribution<double> noise(0.0, 0.1);
+  constexpr int kDraws = 400;
+  int gains = 0, phases = 0;
+  for (int k = 0; k < kDraws; ++k) {
+    const double f = 0.5 + 0.02 * k, w = 2.0 * M_PI * f;
+    const double span = std::ceil(4.0 * f) / f;
+    const Sinusoid in = sinusoid(sampled(span, 0.01, [&](double t) { return std::cos(w * t); }), f),
+                   out = sinusoid(sampled(span, 0.01,
+                                          [&](double t) {
+                                            return 0.8 * std::cos(w * t - 0.5) + noise(engine);
+                                          }),
+                                  f);
+    const Response r = response(in, out);
+    if (std::abs(r.gain.value - 0.8) <= r.gain.within) ++gains;
+    if (std::abs(r.phase.value + 0.5) <= r.phase.within) ++phases;
+  }
+  EXPECT_GE(gains, kDraws * 0.93);
+  EXPECT_GE(phases, kDraws * 0.93);
+}
+
+TEST(Measures, TakeTheLagOfASteadySpeedOutOfTheWidth) {
+  // Down: late by lag * speed above; up: below; apart by `width`.
+  const double width = 3e-4, lag = 0.06, offset = 1e-4, speed = 1e-3;
+  const auto passes = [&](double v) {
+    Passes p;
+    for (int k = 0; k < 3; ++k) {
+      p.up.push_back({offset - 0.5 * width - lag * v, 1e-6});
+      p.down.push_back({offset + 0.5 * width + lag * v, 1e-6});
+    }
+    return p;
+  };
+  const Hysteresis h = hysteresis(passes(speed), passes(2.0 * speed), speed);
+  EXPECT_NEAR(h.width.value, width, 1e-12);
+  EXPECT_NEAR(h.lag.value, lag, 1e-9);
+  EXPECT_NEAR(h.offset.value, offset, 1e-12);
+  EXPECT_NEAR(h.width.within, std::hypot(2.0, 1.0) * M_SQRT2 * 1e-6, 1e-9);
+}
+
+TEST(Measures, WhatIsNotReachedIsNotANumber) {
+  const Track never = sampled(0.4, 0.01, [](double) { return 0.0; });
+  EXPECT_TRUE(std::isnan(threshold({never, never, never}, 1.0).value));
+  EXPECT_TRUE(std::isnan(crossing({1, 2, 3}, {{-0.1, 0}, {-0.2, 0}, {-0.3, 0}}, -1.0).value));
+  EXPECT_TRUE(std::isnan(crossing({}, {}, -1.0).value));
+}
+
+/// A machine that nobody of us has built: delay, play, a lag of the first order, noise.
+struct Drawn {
+  double play, lag, delay;        // [m | rad], [s], [s]
+  double read_noise, felt_noise;  // [m | rad], [m/s^2 | rad/s^2]
+};
+
+/// Between ticks as smooth as what was told: a cubic, its slopes central differences.
+double smoothAt(const Track& track, double t) {
+  const double period = 0.01;
+  const auto at = [&](double k) { return valueAt(track, track.t.front() + k * period); };
+  const double k = std::floor((t - track.t.front()) / period + 1e-9),
+               s = (t - track.t.front()) / period - k;
+  const double a = at(k), b = at(k + 1), m = 0.5 * (b - at(k - 1)), n = 0.5 * (at(k + 2) - a);
+  return a + s * (m + s * (3 * (b - a) - 2 * m - n + s * (2 * (a - b) + m + n)));
+}
+
+/// The run as this machine would have answered it.
+Series answered(Series series, int i, const Drawn& machine, std::mt19937& engine) {
+  constexpr double kStep = 5e-4;  // [s]
+  const ControllerConfig& c = series.experiment.controller;
+  const RigidBody load_P =
+      combine(RigidBody{}, c.payload.X_PL0(),
+              compositeBody(carried(c.payload), series.experiment.plant.task.initial_joints));
+  Track told;
+  for (const Row& row : series.rows) {
+    told.t.push_back(static_cast<double>(row.state.machine_time_ns) * 1e-9);
+    told.y.push_back(row.state.x_desired[i]);
+  }
+  Track y, a;
+  // What has play stands at the middle of each step, the lag is exact over it.
+  double before = told.y.front(), at = before;
+  const double decays = std::exp(-kStep / machine.lag);
+  for (double t = told.t.front(); t < told.t.back(); t += kStep) {
+    const double u = smoothAt(told, t + 0.5 * kStep - machine.delay),
+                 held = std::clamp(before, u - 0.5 * machine.play, u + 0.5 * machine.play),
+                 v = (0.5 * (held + before) - at) / machine.lag;
+    y.t.push_back(t);
+    y.y.push_back(at);
+    a.t.push_back(t);
+    a.y.push_back(((held - before) / kStep - v) / machine.lag);
+    before = held;
+    at = held + (at - held) * decays;
+  }
+  std::normal_distribution<double> noise;
+  const double late = M_SQRT2 / c.servo.sensor_cutoff + 0.5 * c.servo.sensor_window;
+  for (Row& row : series.rows) {
+    if (!row.has_sample) continue;
+    const double read_at = static_cast<double>(row.sample.legs_time_ns) * 1e-9,
+                 felt_at = static_cast<double>(row.sample.wrench_time_ns) * 1e-9 - late;
+    Vec6 x = Vec6::Zero(), felt = Vec6::Zero();
+    x(i) = valueAt(y, read_at) + machine.read_noise * noise(engine);
+    felt(i) = valueAt(a, felt_at) + machine.felt_noise * noise(engine);
+    Vec6::Map(row.state.x_measured) = x;
+    const Transform X = c.geometry.fromHome({x.head<3>(), x.tail<3>()});
+    Vec6::Map(row.state.leg_measured) = legLengths(c.geometry, X);
+    Vec6::Map(row.state.total) =
+        Vec6::Map(row.state.static_wrench) - spatialMass(rotated(X.R, load_P)) * felt;
+  }
+  return series;
+}
+
+const Measurement* find(const CoordinateResult& found, Quantity quantity) {
+  const std::string_view of = coordinate(found.coordinate).name;
+  for (const Measurement& m : found.all)
+    if (m.quantity == quantity && m.of == of) return &m;
+  return nullptr;
+}
+
+TEST(Acceptance, RecoversWhatMachinesWereDrawnWith) {
+  AcceptanceOptions options;
+  options.frequencies = {3, 4, 5, 7, 9};
+  options.amplitudes = {1.0};
+  const Experiment scenario = test::experiment("puma_on_table_4_1");
+  std::mt19937 engine(7);
+  const auto between = [&](double a, double b) {
+    return std::uniform_real_distribution<double>(a, b)(engine);
+  };
+  struct Score {
+    int held = 0, of = 0;
+    std::vector<double> widths = {};  // [-] interval over what it is to find
+    void add(const Measurement* m, double truth) {
+      ++of;
+      ASSERT_TRUE(m);
+      if (std::abs(m->estimate.value - truth) <= m->estimate.within) ++held;
+      widths.push_back(m->estimate.within / truth);
+    }
+  } play, lag, corner, threshold_, read, felt;
+  for (const int i : {2, 4}) {
+    const AcceptanceTest test = acceptanceTest(scenario, i, options);
+    const Series run = recordLockstep(test.experiment).series;
+    const double per_way = i < 3 ? 1.0 : 1.0 / test.radius;
+    for (int k = 0; k < kMachines / 2; ++k) {
+      Drawn m;
+      m.play = k % 2 ? between(1e-4, 1e-3) * per_way : 0.0;
+      m.lag = between(0.03, 0.09);
+      m.delay = between(0.002, 0.02);
+      m.read_noise = between(1e-5, 1e-4) * per_way;
+      m.felt_noise = between(0.005, 0.03) * per_way;
+      const CoordinateResult found = measurementsOf(answered(run, i, m, engine), test);
+      read.add(find(found, Quantity::kRestPosition), m.read_noise);
+      felt.add(find(found, Quantity::kRestAcceleration), m.felt_noise);
+      lag.add(find(found, Quantity::kLag), m.lag + m.delay);
+      if (m.play > 0.0) {
+        play.add(find(found, Quantity::kHysteresis), m.play);
+        continue;
+      }
+      // Without play: 1 - 1/e after delay and lag; -90 deg where w delay + atan(w lag) is that.
+      threshold_.add(find(found, Quantity::kThreshold), m.delay + m.lag);
+      double low = 0.1, high = 400.0;
+      for (int n = 0; n < 60; ++n) {
+        const double w = 0.5 * (low + high);
+        (w * m.delay + std::atan(w * m.lag) < M_PI_2 ? low : high) = w;
+      }
+      const double truth = low / (2.0 * M_PI);
+      if (truth > options.frequencies.front() && truth < options.frequencies.back())
+        corner.add(find(found, Quantity::kCorner), truth);
+    }
+  }
+  const auto holds = [](Score s, double width, const char* name) {
+    ASSERT_GT(s.of, 2) << name;
+    EXPECT_GE(s.held, 0.88 * s.of) << name << " of " << s.of;
+    std::nth_element(s.widths.begin(), s.widths.begin() + s.of / 2, s.widths.end());
+    EXPECT_LT(s.widths[static_cast<std::size_t>(s.of / 2)], width) << name;
+  };
+  // A leg goes slower than z, and is as late.
+  const AcceptanceTest test = acceptanceTest(scenario, 2, options);
+  const Drawn late = {0.0, 0.06, 0.01, 1e-5, 0.01};
+  const CoordinateResult of_legs =
+      measurementsOf(answered(recordLockstep(test.experiment).series, 2, late, engine), test);
+  for (const Measurement& m : of_legs.all)
+    if (m.quantity == Quantity::kLag) {
+      EXPECT_NEAR(m.estimate.value, 0.07, 0.002) << m.of;
+    }
+  holds(read, 0.15, "noise of the readings");
+  holds(felt, 0.15, "noise of the acceleration");
+  holds(lag, 0.1, "lag");
+  holds(play, 0.1, "play");
+  holds(threshold_, 0.2, "threshold");
+  holds(corner, 0.03, "corner");
+}
+
+TEST(Acceptance, FindsTheServoThatItsEquationsSay) {
+  // (2.17) behind a LegSlave, alike both ways: K e^-sD / (s (1 + tau s) + K e^-s(D-A)), and half a
+  // period of the held command in D.
+  const Experiment scenario = test::experiment(
+      "puma_on_table_4_1",
+      {"legs.gain_extend_in_per_s_per_ma=1", "legs.gain_retract_in_per_s_per_ma=1"});
+  AcceptanceOptions options;
+  options.frequencies = {0.5, 1, 2, 3, 5, 7};
+  options.amplitudes = {1.0};
+  options.passes = options.steps = false;
+  const AcceptanceTest test = acceptanceTest(scenario, 2, options);
+  const CoordinateResult found = measurementsOf(recordLockstep(test.experiment).series, test);
+  const double K = 0.0254 * (10.0 / 32768.0) * 4.0 * 8500.0 / 256.0 * 363.6 / 0.0254,  // [1/s]
+      tau = 0.0064, update = 0.001023, read = 0.000341, period = 0.01;
+  const double feedback = 0.5 * update + 0.5 * read,
+               command = 0.5 * period + 0.5 * update + 0.5 * update;
+  int looked = 0;
+  for (const Measurement& m : found.all) {
+    if (m.of != "z" || m.quantity != Quantity::kGain) continue;
+    const std::complex<double> s(0.0, 2.0 * M_PI * m.frequency);
+    const std::complex<double> H =
+        K * std::exp(-s * command) / (s * (1.0 + tau * s) + K * std::exp(-s * feedback));
+    EXPECT_NEAR(m.estimate.value, std::abs(H), 0.01 + m.estimate.within) << m.frequency;
+    for (const Measurement& phase : found.all)
+      if (phase.quantity == Quantity::kPhase && phase.frequency == m.frequency) {
+        EXPECT_NEAR(phase.estimate.value, std::arg(H), 0.03 + phase.estimate.within) << m.frequency;
+      }
+    ++looked;
+  }
+  EXPECT_EQ(looked, 6);
+}
+
+TEST(Acceptance, StaysWithinTheShareOfTheMachineThatItWasGiven) {
+  const Experiment scenario = test::experiment("puma_on_table_4_1");
+  for (int i = 0; i < 6; ++i) {
+    const AcceptanceTest test = acceptanceTest(scenario, i, {});
+    const double way = std::min(test.down.distance, test.up.distance);
+    for (const AcceptanceTest::Sine& s : test.sines) {
+      const double w = 2.0 * M_PI * s.frequency;
+      EXPECT_LE(s.amplitude, 0.5 * way * (1 + 1e-9));
+      EXPECT_LE(s.amplitude * w, 0.5 * test.fastest * (1 + 1e-9));
+      EXPECT_LE(s.amplitude * w * w, 0.5 * test.hardest * (1 + 1e-9));
+    }
+    EXPECT_TRUE(recordLockstep(test.experiment).result.good()) << i;
+    if (i == 2) i = 4;  // half of them are enough to run
+  }
+}
+
+TEST(Acceptance, SaysWhatARunThatWasCutOffDoesNotTell) {
+  AcceptanceOptions options;
+  options.frequencies = {3, 7};
+  options.amplitudes = {1.0};
+  const AcceptanceTest test = acceptanceTest(test::experiment("puma_on_table_4_1"), 2, options);
+  const Series whole = recordLockstep(test.experiment).series;
+  const auto after = [&](double seconds) {
+    Series cut = whole;
+    std::erase_if(cut.rows, [&](const Row& row) { return row.t > seconds; });
+    return measurementsOf(cut, test);
+  };
+  EXPECT_TRUE(after(0.0).all.empty());
+  EXPECT_GE(after(0.0).missing.size(), 4u);
+  const CoordinateResult first = after(14.0);  // in the second sine
+  EXPECT_TRUE(find(first, Quantity::kGain));
+  EXPECT_FALSE(find(first, Quantity::kHysteresis));
+  EXPECT_FALSE(find(first, Quantity::kThreshold));
+  EXPECT_TRUE(find(after(1e9), Quantity::kThreshold));
+  EXPECT_TRUE(after(1e9).missing.empty());
+  Series deaf = whole;  // no sample came
+  for (Row& row : deaf.rows) row.has_sample = false;
+  EXPECT_TRUE(measurementsOf(deaf, test).all.empty());
+  Series stale = whole;  // or the same one again and again
+  for (Row& row : stale.rows) row.sample = whole.rows.front().sample;
+  EXPECT_TRUE(measurementsOf(stale, test).all.empty());
+}
+
+TEST(Acceptance, VerdictsFollowTheWholeInterval) {
+  CoordinateResult z;
+  z.coordinate = 2;
+  const auto put = [&](double f, double value, double within) {
+    Measurement m;
+    m.of = "z";
+    m.quantity = Quantity::kGain;
+    m.frequency = f;
+    m.estimate = {value, within};
+    z.all.push_back(m);
+  };
+  put(1.0, 0.95, 0.01);
+  put(2.0, 0.80, 0.05);
+  const auto is = [&](double least, double up_to, std::vector<std::string> of = {}) {
+    AcceptanceLimit limit;
+    limit.quantity = Quantity::kGain;
+    limit.least = least;
+    limit.up_to = up_to;
+    limit.of = std::move(of);
+    return judge({limit}, {z}).front().is;
+  };
+  using Is = AcceptanceVerdict::Is;
+  EXPECT_EQ(is(0.9, 1.0), Is::kKept);
+  EXPECT_EQ(is(0.9, 2.0), Is::kBroken);
+  EXPECT_EQ(is(0.78, 2.0), Is::kOpen);
+  EXPECT_EQ(is(0.96, 1.0), Is::kOpen);
+  EXPECT_EQ(is(0.5, 2.0), Is::kKept);
+  EXPECT_EQ(is(0.5, 2.0, {"z", "x"}), Is::kNotMeasured);
+  EXPECT_EQ(is(0.9, 2.0, {"z", "x"}), Is::kBroken);
+  EXPECT_EQ(is(0.5, 0.5), Is::kNotMeasured);
+  put(1.5, NAN, NAN);
+  EXPECT_EQ(is(0.5, 2.0), Is::kOpen);
+  z.all.clear();
+  EXPECT_EQ(is(0.5, 2.0), Is::kNotMeasured);
+}
+
+class Accept : public test::Programs {
+ protected:
+  std::string limits(const std::string& text) {
+    std::ofstream(file("limits.yaml")) << text;
+    return " --limits " + file("limits.yaml");
+  }
+};
+
+TEST_F(Accept, LeavesAPageANumberTableAndAVerdict) {
+  const std::string z = app("accept") +
+                        "puma_on_table_4_1 --lockstep --coordinates z --tests sines,steps "
+                        "--frequencies 1,5,7 --amplitudes 1";
+  const test::Output kept =
+      test::sh(z + out("a") +
+               limits("limits:\n  - {quantity: gain, up_to_hz: 1, least: 0.9, most: 1.1}\n"
+                      "  - {quantity: threshold, of: [z], most_s: 0.2}\n"));
+  ASSERT_EQ(kept.status, 0) << kept.text;
+  EXPECT_NE(kept.text.find("kept"), std::string::npos) << kept.text;
+  for (const char* name : {"accept.html", "accept.csv", "z/run.lcmlog"})
+    EXPECT_TRUE(std::filesystem::exists(folder_ / "a" / name)) << name;
+  std::ifstream csv(file("a/accept.csv"));
+  std::string header, line;
+  std::getline(csv, header);
+  EXPECT_EQ(header, "of,quantity,unit,value,within_95,frequency_hz,amplitude_m_or_rad,note\r");
+  int phases = 0;
+  while (std::getline(csv, line)) phases += line.starts_with("z,phase,rad,-") ? 1 : 0;
+  EXPECT_EQ(phases, 3);
+
+  const test::Output broken =
+      test::sh(z + out("b") + limits("limits: [{quantity: gain, least: 0.9}]\n"));
+  EXPECT_EQ(broken.status, 1) << broken.text;
+  EXPECT_NE(broken.text.find("BROKEN"), std::string::npos) << broken.text;
+  const test::Output missing =
+      test::sh(z + out("c") + limits("limits: [{quantity: hysteresis, of: [z], most_m: 0.1}]\n"));
+  EXPECT_EQ(missing.status, 1) << missing.text;
+  EXPECT_NE(missing.text.find("not measured"), std::string::npos) << missing.text;
+}
+
+TEST_F(Accept, RefusesLimitsThatMeanNothing) {
+  const std::string z = app("accept") + "puma_on_table_4_1 --lockstep --coordinates z" + out("a");
+  const auto refused = [&](const std::string& text, const std::string& says) {
+    expectRefusal(z + limits(text), says);
+  };
+  refused("limits: [{quantity: gian, least: 1}]\n", "limits[0].quantity");
+  refused("limits: [{quantity: gain}]\n", "least, most, or both");
+  refused("limits: [{quantity: gain, least: 2, most: 1}]\n", "most");
+  refused("limits: [{quantity: hysteresis, most_m: 1}]\n", "of");
+  refused("limits: [{quantity: hysteresis, of: [x, alpha], most_m: 1}]\n", "of");
+  refused("limits: [{quantity: hysteresis, of: [alpha], most_m: 1}]\n", "most_deg");
+  refused("limits: [{quantity: gain, of: [w], least: 1}]\n", "of");
+  refused("limits: [{quantity: corner_hz, least_hz: 1, up_to_hz: 2}]\n", "up_to_hz");
+  refused("limits: [{quantity: gain, least: .nan}]\n", "least");
+  refused("limit: []\n", "limits");
+  expectRefusal(app("accept") + "z_sine --lockstep --move", "--move");
+  expectRefusal(app("accept") + "z_sine --lockstep --coordinates w", "--coordinates");
+  expectRefusal(app("accept") + "z_sine --lockstep --frequencies 2,1", "--frequencies");
+  expectRefusal(app("accept") + "z_sine --lockstep --share nan", "--share");
+}
+
+}  // namespace
+}  // namespace ves
