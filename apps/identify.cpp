@@ -111,18 +111,24 @@ int masses(const std::string& log, const std::string& scenario, const std::strin
 /// The servos from any log in which every leg moves both ways.
 int servo(const std::string& log, const std::string& scenario, const std::string& file) {
   const Series series = seriesOf(log, scenario);
-  const IdentifiedServo all = orRefuse(log, [&] { return identifiedServo(series); });
+  const IdentifiedServo all = orRefuse(log, [&] { return identifiedServo(series, series); });
   const ServoEstimate& found = all.legs;
-  fmt::print("{:>3}{:>22}{:>22}{:>20}{:>20}{:>12}\n", "leg", "extending [1/s]", "retracting [1/s]",
-             "tau [ms]", "delay [ms]", "rest [um]");
+  const bool open = !found.servo.opening.isZero(0.0);
+  fmt::print("{:>3}{:>22}{:>22}{:>20}{:>20}{}{:>12}\n", "leg", "extending [1/s]",
+             "retracting [1/s]", "tau [ms]", "delay [ms]",
+             open ? fmt::format("{:>18}", "open [um]") : "", "rest [um]");
   for (int i = 0; i < kLegs; ++i) {
     const auto cell = [&](Vec6 ServoModel::*value, double scale) {
       return fmt::format("{:.3f} +- {:.3f}", scale * (found.servo.*value)(i),
                          scale * (found.deviation.*value)(i));
     };
-    fmt::print("{:>3}{:>22}{:>22}{:>20}{:>20}{:>12.1f}\n", i + 1, cell(&ServoModel::extend, 1.0),
-               cell(&ServoModel::retract, 1.0), cell(&ServoModel::tau, 1e3),
-               cell(&ServoModel::delay, 1e3), found.residual(i) * 1e6);
+    fmt::print(
+        "{:>3}{:>22}{:>22}{:>20}{:>20}{}{:>12.1f}\n", i + 1, cell(&ServoModel::extend, 1.0),
+        cell(&ServoModel::retract, 1.0), cell(&ServoModel::tau, 1e3), cell(&ServoModel::delay, 1e3),
+        open ? fmt::format("{:>18}", fmt::format("{:.0f} +- {:.0f}", found.servo.opening(i) * 1e6,
+                                                 found.deviation.opening(i) * 1e6))
+             : "",
+        found.residual(i) * 1e6);
   }
   if (all.sensor)
     fmt::print(

@@ -46,15 +46,14 @@ int showLoop(const Experiment& e) {
         "grows, slowly: {:.4g} times as much after {:.4g} s, which is let pass up to {:.4g} "
         "(controller.most_growth); a longer segment is refused\n",
         std::exp(std::max(0.0, v.worst.growth) * v.longest), v.longest, e.controller.most_growth);
-  for (const Direction direction : {Direction::kExtending, Direction::kRetracting}) {
-    const bool extending = direction == Direction::kExtending;
-    const Margins m = margins(extending ? v.extending : v.retracting);
+  for (const Direction direction : directionsOf(e.controller)) {
+    const Margins m = margins(v.at(direction));
     const auto least = [](bool most) { return most ? "at least " : ""; };
     fmt::print(
         "stable, legs {}: where it is worst, bears {}{:.0f} % of the robot's inertia, {}{:.0f} % "
         "of the servos' gain, a wrench {}{:.2f} ms earlier or {}{:.2f} ms later than believed, and "
         "{}{} ticks of further delay\n",
-        extending ? "extending" : "retracting", least(m.gain >= Margins::kMostGain), 100.0 * m.gain,
+        name(direction), least(m.gain >= Margins::kMostGain), 100.0 * m.gain,
         least(m.servo_gain >= Margins::kMostGain), 100.0 * m.servo_gain,
         least(m.early >= Margins::kMostTime), 1e3 * m.early, least(m.late >= Margins::kMostTime),
         1e3 * m.late, least(m.delay == Margins::kMostDelay), m.delay);

@@ -357,6 +357,11 @@ TEST(Acceptance, VerdictsFollowTheWholeInterval) {
   EXPECT_EQ(is(0.5, 2.0, {"z", "x"}), Is::kNotMeasured);
   EXPECT_EQ(is(0.9, 2.0, {"z", "x"}), Is::kBroken);
   EXPECT_EQ(is(0.5, 0.5), Is::kNotMeasured);
+  AcceptanceLimit above;
+  above.quantity = Quantity::kGain;
+  above.from = 1.5;
+  above.most = 0.9;  // the one below is not meant
+  EXPECT_EQ(judge({above}, {z}).front().is, Is::kKept);
   put(1.5, NAN, NAN);
   EXPECT_EQ(is(0.5, 2.0), Is::kOpen);
   z.all.clear();

@@ -97,6 +97,33 @@ TEST_F(Commission, ItsBiasNeedsNoCalibrationAfterwards) {
   EXPECT_LT(Vec3::Map(row.state.dynamic + 3).norm(), 0.5);  // [N m]
 }
 
+TEST_F(Commission, FindsHowFarValvesAreOpenAtNull) {
+  // An E at null lets through what a current does: the D/A's volts and amperes of a count.
+  const std::vector<std::string> hydraulic = with(kCompensated, "legs.model=hydraulic");
+  for (const double open_ma : {0.1, 0.3, 0.0, -0.2}) {
+    const std::vector<std::string> sets =
+        with(hydraulic, fmt::format("legs.hydraulic.valve_opening_ma={}", open_ma));
+    const Experiment told = loadExperiment(scenario("puma_on_table_4_1"), sets);
+    const Commissioning c = commissioningOf(told, {});
+    const Commissioned found = commissioned(recordLockstep(c.experiment).series, c);
+    ASSERT_TRUE(found.servo);
+    const Vec6& opening = found.servo->legs.servo.opening;
+    if (!(open_ma > 0.0)) {
+      EXPECT_TRUE(opening.isZero(0.0)) << open_ma;
+      continue;
+    }
+    const double ma_per_metre = 4.0 * (10.0 / 32768.0) * 8500.0 / 256.0 * 363.6 / 0.0254,
+                 truth = open_ma / ma_per_metre;
+    EXPECT_NEAR(opening.mean(), truth, 0.35 * truth) << open_ma;
+    if (open_ma < 0.3) continue;
+    // Believed, it is worth two thirds of the error.
+    std::ofstream(file("belief.yaml")) << beliefOf(found, told, "");
+    const Experiment believing =
+        loadExperiment(scenario("puma_on_table_4_1"), sets, {.belief = file("belief.yaml")});
+    EXPECT_LT(errorOf(believing), 0.4 * errorOf(told));
+  }
+}
+
 TEST_F(Commission, WithoutWeightFindsTheServosAlone) {
   const Experiment told =
       test::experiment("puma_on_table_4_1", {"gravity_m_per_s2=0", "plant_mismatch={tau: 1.3}"});

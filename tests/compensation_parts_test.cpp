@@ -346,6 +346,38 @@ TEST(FeedForward, LeadsARampByItsDelayToo) {
   }
 }
 
+/// A valve whose edges are both open at null by `open`, as (2.11) has them under constant pressure:
+/// what the supply's edge lets in less what the return's lets out.
+double orifices(double up, double down, double open, double E) {
+  const double rest = open * (down - up) / (up + down),  // where as much goes in as out
+      x = E + rest;
+  return up * std::max(0.0, open + x) - down * std::max(0.0, open - x);
+}
+
+TEST(ServoModel, OfAnOpenValveIsWhatItsOrificesPass) {
+  ServoModel servo = experiment("z_sine", kCompensated).controller.servo;
+  for (const double open : {0.0, 5e-5, 3e-4}) {
+    servo.opening.setConstant(open);
+    const double up = servo.extend(2), down = servo.retract(2);
+    for (double E = -2e-3; E <= 2e-3; E += 1.7e-5) {
+      const double v = speedOf(servo, 2, E);
+      EXPECT_NEAR(v, orifices(up, down, open, E), 1e-12) << open << " " << E;
+      EXPECT_NEAR(differenceOf(servo, 2, v), E, 1e-12) << open << " " << E;
+      const double d = 1e-7,
+                   slope = (speedOf(servo, 2, E + d) - speedOf(servo, 2, E - d)) / (2 * d);
+      if (open == 0.0 || nearNull(servo, 2, E - d) != nearNull(servo, 2, E + d)) continue;
+      EXPECT_NEAR(slope,
+                  nearNull(servo, 2, E) ? up + down
+                  : E > 0.0             ? up
+                                        : down,
+                  0.01 * up)
+          << open << " " << E;
+    }
+    EXPECT_EQ(speedOf(servo, 2, 0.0), 0.0);
+    EXPECT_EQ(differenceOf(servo, 2, 0.0), 0.0);
+  }
+}
+
 TEST(FeedForward, ShareZeroIsTheReportsReference) {
   const ServoModel servo = experiment("z_sine", kCompensated).controller.servo;
   const LegMotion legs{Vec6::Constant(1.5), Vec6::Constant(0.3), Vec6::Constant(-2.0)};

@@ -832,6 +832,15 @@ TEST(ServoIdentification, FindsWhatTheMachineIs) {
     EXPECT_EQ(allowed.mass_error, 3.0 * 1e-3);
     EXPECT_GT(allowed.gain_error, 2.9 * found.deviation.extend(0) / found.servo.extend(0));
     EXPECT_LT(allowed.gain_error, 0.05);
+    EXPECT_TRUE(found.servo.opening.isZero(0.0)) << set;  // its valves just close
+    EXPECT_FALSE(text.find("opening_m"));
+    kept.servo.opening.setConstant(1.5e-4);
+    kept.deviation.opening.setConstant(2e-5);
+    const Value open_text = parseDocument(write(kept), "servo.yaml");
+    const ServoRecord open = readServo(Section(open_text, ""));
+    EXPECT_EQ(open.servo.opening, kept.servo.opening);
+    EXPECT_EQ(open.deviation.opening, kept.deviation.opening);
+    EXPECT_EQ(withRecord(nominal, open).opening, kept.servo.opening);
     // In place of what the keys say, but for what may be learnt.
     Compensation guessed;
     guessed.gain_error = guessed.timing_error = guessed.mass_error = 0.4;

@@ -39,6 +39,35 @@ TEST(Gate, NamesWhatGrowsAndWhatItNamesCuresIt) {
   EXPECT_FALSE(with("base.arm.damping_ratio=" + std::to_string(v.damping_ratio / 1.26)));
 }
 
+TEST(Gate, LooksAtLegsThatHardlyMoveWhereTheirValvesAreOpen) {
+  // There both edges pass: a machine whose loop just bears its gains may not bear their sum.
+  Experiment e = test::experiment("puma_on_table_4_1", test::kCompensated);
+  const double up = e.controller.servo.extend.mean(), down = e.controller.servo.retract.mean();
+  EXPECT_EQ(directionsOf(e.controller).size(), 2u);
+  const LoopVerdict shut = assessStability(e.controller, e.plant.task);
+  e.controller.servo.opening.setConstant(1e-4);
+  EXPECT_EQ(directionsOf(e.controller).size(), 3u);
+  const Loop null = loopOf(e.controller, e.plant.task.initial_joints, Direction::kNearNull);
+  EXPECT_DOUBLE_EQ(null.velocity_gain, up + down);
+  EXPECT_DOUBLE_EQ(null.model.servo.extend(0), up + down);
+  const LoopVerdict open = assessStability(e.controller, e.plant.task);
+  EXPECT_GE(open.worst.radius, shut.worst.radius);
+  EXPECT_EQ(open.near_null.velocity_gain, up + down);
+  // What one of three directions does is in the verdict: the sum of both gains alone is refused.
+  const auto stable = [&](double gain) {
+    Experiment more = e;
+    more.controller.servo.opening.setConstant(gain > 0.0 ? 1e-4 : 0.0);
+    const double share = std::abs(gain);
+    more.controller.servo.extend *= share;
+    more.controller.servo.retract *= share;
+    return isStable(more.controller, more.plant.task);
+  };
+  double share = 1.0;
+  while (share < 100.0 && stable(share)) share *= 1.6;
+  ASSERT_LT(share, 100.0);
+  EXPECT_TRUE(stable(-share));
+}
+
 TEST(Gate, ItsWorstIsTheWorstOfAllPosesAndBothDirections) {
   // Unfolded in the middle of its program, and back.
   const Experiment folds = test::experiment(

@@ -96,6 +96,32 @@ TEST(ServoAdaptation, FindsWhatTheServosAreOffBy) {
   }
 }
 
+TEST(ServoAdaptation, KnowsValvesThatAreOpenAtNull) {
+  // Against servos of the same kind whose gains are off, slow enough to spend half of its time
+  // there.
+  ServoModel believed = test::experiment("z_sine").controller.servo;
+  believed.opening.setConstant(3e-4);
+  ServoModel truth = believed;
+  truth.extend *= 1.05;
+  truth.retract *= 0.96;
+  ModelledServos machine(truth, kPeriod, 0.5);
+  ServoAdaptation learns(believed, kSettings, kPeriod);
+  const Vec6 middle = Vec6::Constant(1.5);
+  machine.reset(middle, 0);
+  learns.reset(middle, 0);
+  for (std::int64_t k = 0; k < 4000; ++k) {
+    const double t = static_cast<double>(k) * kPeriod;
+    const Vec6 r = middle + Vec6::Constant(0.004 * std::sin(2.0 * M_PI * 0.5 * t) +
+                                           0.0015 * std::sin(2.0 * M_PI * 2.3 * t));
+    machine.send(r, k, k * kTick);
+    learns.send(r, k, k * kTick);
+    machine.advance((k + 1) * kTick);
+    learns.learn(machine.length(), (k + 1) * kTick);
+  }
+  EXPECT_NEAR(learns.gains().extend(0) / believed.extend(0), 1.05, 0.01);
+  EXPECT_NEAR(learns.gains().retract(0) / believed.retract(0), 0.96, 0.01);
+}
+
 TEST(ServoAdaptation, KnowsTheDerivativeGainAndTheRail) {
   Learning derivative(1.05, 0.96, 0.0, kSettings, 3000);
   derivative.swing(20.0, 0.02);

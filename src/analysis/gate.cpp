@@ -15,8 +15,6 @@
 namespace ves {
 namespace {
 
-constexpr Direction kBoth[] = {Direction::kExtending, Direction::kRetracting};
-
 std::vector<CarriedRobot> bodies(const ControllerConfig& controller, const RobotTask& task) {
   std::vector<CarriedRobot> out;
   for (const ProgramRobot& one : programRobots(controller, task)) out.push_back(one.body);
@@ -112,11 +110,12 @@ std::vector<Loop> loopsOf(const ControllerConfig& controller, const JointVector&
   return out;
 }
 
-/// True when the `change`d loops decay with every robot and in both directions.
+/// True when the `change`d loops decay with every robot and in all directions.
 template <class Change>
 bool holds(const ControllerConfig& controller, const RobotTask& task, double growth,
            const std::vector<CarriedRobot>& robots, const Change& change) {
-  return std::all_of(std::begin(kBoth), std::end(kBoth), [&](Direction direction) {
+  const std::vector<Direction> directions = directionsOf(controller);
+  return std::all_of(directions.begin(), directions.end(), [&](Direction direction) {
     const std::vector<Loop> loops = loopsOf(controller, task.initial_joints, direction);
     return std::all_of(loops.begin(), loops.end(), [&](Loop loop) {
       loop.allowed_growth = growth;
@@ -187,8 +186,9 @@ bool isStable(const ControllerConfig& controller, const RobotTask& task, double 
 bool contactsDecay(const ControllerConfig& controller, const RobotTask& task) {
   if (controller.passivity.enabled) return true;
   const std::vector<ExpectedContact> contacts = expectedContacts(controller, task);
+  const std::vector<Direction> directions = directionsOf(controller);
   return std::all_of(contacts.begin(), contacts.end(), [&](const ExpectedContact& contact) {
-    return std::all_of(std::begin(kBoth), std::end(kBoth), [&](Direction direction) {
+    return std::all_of(directions.begin(), directions.end(), [&](Direction direction) {
       return !growsLeaning(
           leaning(loopOf(controller, contact.q, direction), contact, contact.leaning.stiffness));
     });
@@ -213,7 +213,7 @@ LoopVerdict assessStability(const ControllerConfig& controller, const RobotTask&
       out.off = *corner;
       out.uncertainty = uncertaintyOf(controller.compensation);
       const auto& [timing, gain, mass] = out.off;
-      for (const Direction direction : kBoth)
+      for (const Direction direction : directionsOf(controller))
         for (const Loop& loop : loopsOf(controller, task.initial_joints, direction))
           for (CarriedRobot robot : robots) {
             robot.robot_P = scaledDensity(1.0 + mass * out.uncertainty.mass, robot.robot_P);
@@ -223,9 +223,11 @@ LoopVerdict assessStability(const ControllerConfig& controller, const RobotTask&
           }
     }
   double largest = 0.0;
-  for (const Direction direction : kBoth) {
+  for (const Direction direction : directionsOf(controller)) {
     double most = 0.0;
-    Loop& kept = direction == Direction::kExtending ? out.extending : out.retracting;
+    Loop& kept = direction == Direction::kExtending    ? out.extending
+                 : direction == Direction::kRetracting ? out.retracting
+                                                       : out.near_null;
     for (const Loop& loop : loopsOf(controller, task.initial_joints, direction)) {
       for (const CarriedRobot& robot : robots) {
         const Loop with = carrying(loop, robot);
@@ -239,7 +241,7 @@ LoopVerdict assessStability(const ControllerConfig& controller, const RobotTask&
     largest = most;
     out.direction = direction;
   }
-  out.worst = dominantRoot(out.direction == Direction::kExtending ? out.extending : out.retracting);
+  out.worst = dominantRoot(out.at(out.direction));
   if (out.stable && growth > 0.0 && !isStable(controller, task)) out.stable_for = out.longest;
   if (out.as_believed) return out;
   out.stable_modes = 0;
@@ -313,8 +315,7 @@ std::string explain(const LoopVerdict& v) {
       "the loop of base, robot and machine{} would diverge: {}, most in {} (legs {}). What cures "
       "it: {}",
       gives > 0.0 ? fmt::format(", which gives way at {:.3g} Hz,", gives) : "",
-      explain(v.worst, v.longest), coordinate(static_cast<int>(i)).name,
-      v.direction == Direction::kExtending ? "extending" : "retracting", cure);
+      explain(v.worst, v.longest), coordinate(static_cast<int>(i)).name, name(v.direction), cure);
 }
 
 std::string applyStabilityCheck(ControllerConfig& controller, const RobotTask& task) {

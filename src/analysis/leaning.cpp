@@ -336,7 +336,7 @@ std::vector<ContactVerdict> assessContacts(const ControllerConfig& controller,
     worst.contact = contact;
     worst.limits = {HUGE_VAL, HUGE_VAL};
     double most = -1.0;
-    for (const Direction direction : {Direction::kExtending, Direction::kRetracting}) {
+    for (const Direction direction : directionsOf(controller)) {
       const Loop loop = loopOf(controller, contact.q, direction);
       const Loop as_is = leaning(loop, contact, contact.leaning.stiffness);
       worst.grows = worst.grows || growsLeaning(as_is);

@@ -157,6 +157,22 @@ bool decays(const Loop& loop, const Lifted& lifted) {
 
 }  // namespace
 
+const char* name(Direction direction) {
+  switch (direction) {
+    case Direction::kExtending: return "extending";
+    case Direction::kRetracting: return "retracting";
+    case Direction::kSwinging: return "swinging";
+    case Direction::kNearNull: return "hardly moving";
+  }
+  return "";
+}
+
+std::vector<Direction> directionsOf(const ControllerConfig& controller) {
+  std::vector<Direction> out = {Direction::kExtending, Direction::kRetracting};
+  if (controller.servo.opening.maxCoeff() > 0.0) out.push_back(Direction::kNearNull);
+  return out;
+}
+
 Loop loopOf(const ControllerConfig& controller, const JointVector& q, Direction direction) {
   Loop loop;
   loop.base = controller.admittance;
@@ -169,6 +185,8 @@ Loop loopOf(const ControllerConfig& controller, const JointVector& q, Direction 
   double model = 2.0 * up * down / (up + down);
   if (direction == Direction::kExtending) model = up;
   if (direction == Direction::kRetracting) model = down;
+  if (direction == Direction::kNearNull) model = up + down;
+  own.servo.opening.setZero();  // that is in the gain
   own.setGain(model);
   own.servo.tau.setConstant(own.servo.tau.mean());
   own.servo.delay.setConstant(own.servo.delay.mean());
@@ -316,7 +334,7 @@ ModalModel softest(const ModalModel& base, int k) {
 int stableModes(const ControllerConfig& controller, const JointVector& q) {
   const auto all = static_cast<int>(controller.admittance.stiffness.size());
   for (int k = 1; k <= all; ++k)
-    for (const Direction direction : {Direction::kExtending, Direction::kRetracting}) {
+    for (const Direction direction : directionsOf(controller)) {
       Loop loop = loopOf(controller, q, direction);
       loop.base = softest(loop.base, k);
       if (!decays(loop)) return k - 1;

@@ -24,6 +24,10 @@ constexpr Key<Vec6> kKeys[] = {
     {"tau_s", &ServoModel::tau, 1e-4, 1.0, "of the cylinder"},
     {"delay_s", &ServoModel::delay, -0.01, 0.1, "from a tick to the LegSlave"}};
 
+/// Where valves were found open at null.
+constexpr Key<Vec6> kOpening = {"opening_m", &ServoModel::opening, 0.0, 0.01,
+                                "of both edges at null, as a difference of length"};
+
 /// Of the force-torque sensor; files of earlier versions have none.
 constexpr Key<double> kSensorKeys[] = {
     {"sensor_delay_s", &ServoModel::sensor_delay, -0.01, 0.01, "of the wrench, beyond its filter"},
@@ -43,6 +47,10 @@ std::string write(const ServoRecord& r) {
     line(key.name, r.servo.*key.value, fmt::format("  # {}", key.what));
     line(fmt::format("{}_deviation", key.name), r.deviation.*key.value, "");
   }
+  if (r.servo.opening.maxCoeff() > 0.0) {
+    line(kOpening.name, r.servo.opening, fmt::format("  # {}", kOpening.what));
+    line(fmt::format("{}_deviation", kOpening.name), r.deviation.opening, "");
+  }
   for (const Key<double>& key : kSensorKeys)
     if (r.deviation.*key.value > 0.0)
       text += fmt::format("{0}: {1}  # {2}\n{0}_deviation: {3}\n", key.name, r.servo.*key.value,
@@ -57,6 +65,12 @@ ServoRecord readServo(Section s) {
     r.servo.*key.value = s.vector(key.name, kLegs, key.lo, key.hi);
     r.deviation.*key.value = s.vector(fmt::format("{}_deviation", key.name), kLegs, 0.0, 1e3);
   }
+  r.deviation.opening.setZero();
+  if (s.has(kOpening.name)) {
+    r.servo.opening = s.vector(kOpening.name, kLegs, kOpening.lo, kOpening.hi);
+    r.deviation.opening =
+        s.vector(fmt::format("{}_deviation", kOpening.name), kLegs, 0.0, kOpening.hi);
+  }
   for (const Key<double>& key : kSensorKeys) {
     r.deviation.*key.value = 0.0;
     if (!s.has(key.name)) continue;
@@ -69,6 +83,7 @@ ServoRecord readServo(Section s) {
 
 ServoModel withRecord(ServoModel nominal, const ServoRecord& record) {
   for (const Key<Vec6>& key : kKeys) nominal.*key.value = record.servo.*key.value;
+  nominal.opening = record.servo.opening;
   for (const Key<double>& key : kSensorKeys) nominal.*key.value = record.servo.*key.value;
   return nominal;
 }

@@ -63,7 +63,7 @@ void ModelledServos::update() noexcept {
   E_ -= reading(L_, v_) + servo_.derivative * v_;
   for (int i = 0; i < kLegs; ++i) {
     E_(i) = std::clamp(E_(i), -servo_.rail, servo_.rail);
-    v_end_(i) = (E_(i) > 0.0 ? servo_.extend(i) : servo_.retract(i)) * E_(i);
+    v_end_(i) = speedOf(servo_, i, E_(i));
   }
 }
 

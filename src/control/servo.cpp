@@ -5,6 +5,39 @@
 #include <cmath>
 
 namespace ves {
+namespace {
+
+/// [m] by which the edge that E opens is open already where the leg rests: more on the side of the
+/// slower motion, because the spool rests off the middle.
+double ahead(const ServoModel& servo, int i, double E) noexcept {
+  const double up = servo.extend(i), down = servo.retract(i);
+  return 2.0 * servo.opening(i) * (E > 0.0 ? down : up) / (up + down);
+}
+
+}  // namespace
+
+double speedOf(const ServoModel& servo, int i, double E) noexcept {
+  const double K = E > 0.0 ? servo.extend(i) : servo.retract(i);
+  if (!(servo.opening(i) > 0.0)) return K * E;
+  const double size = std::abs(E);
+  return std::copysign(
+      std::min((servo.extend(i) + servo.retract(i)) * size, K * (size + ahead(servo, i, E))), E);
+}
+
+double differenceOf(const ServoModel& servo, int i, double v_end) noexcept {
+  const double K = v_end > 0.0 ? servo.extend(i) : servo.retract(i);
+  if (!(servo.opening(i) > 0.0)) return v_end / K;
+  const double size = std::abs(v_end);
+  return std::copysign(
+      std::max(size / (servo.extend(i) + servo.retract(i)), size / K - ahead(servo, i, v_end)),
+      v_end);
+}
+
+bool nearNull(const ServoModel& servo, int i, double E) noexcept {
+  const double K = E > 0.0 ? servo.extend(i) : servo.retract(i);
+  return servo.opening(i) > 0.0 &&
+         (servo.extend(i) + servo.retract(i) - K) * std::abs(E) < K * ahead(servo, i, E);
+}
 
 Vec6 feedForward(const ServoModel& servo, const LegMotion& legs, double lead, double period,
                  double share) noexcept {
@@ -15,9 +48,9 @@ Vec6 feedForward(const ServoModel& servo, const LegMotion& legs, double lead, do
     const double A = D - servo.reading_age - 0.5 * servo.update;
     const double v = legs.L_dot(i) + D * legs.L_ddot(i);
     const double v_end = v + servo.tau(i) * legs.L_ddot(i);
-    const double E = v_end / (v_end > 0.0 ? servo.extend(i) : servo.retract(i));
-    const double ahead = A * (legs.L_dot(i) + 0.5 * A * legs.L_ddot(i)) + servo.derivative * v;
-    reference(i) = legs.L(i) + share * (ahead + std::clamp(E, -servo.rail, servo.rail));
+    const double E = differenceOf(servo, i, v_end);
+    const double forward = A * (legs.L_dot(i) + 0.5 * A * legs.L_ddot(i)) + servo.derivative * v;
+    reference(i) = legs.L(i) + share * (forward + std::clamp(E, -servo.rail, servo.rail));
   }
   return reference;
 }

@@ -45,14 +45,21 @@ void ServoAdaptation::update() noexcept {
   const ServoModel& servo = believed_.model();
   const Vec6& E = believed_.difference();
   for (int i = 0; i < kLegs; ++i) {
-    const bool extends = E(i) > 0.0;
-    const double K = extends ? servo.extend(i) : servo.retract(i);
+    const bool extends = E(i) > 0.0, null = nearNull(servo, i, E(i));
+    const double up = servo.extend(i), down = servo.retract(i),
+                 K = null      ? up + down
+                     : extends ? up
+                               : down;
+    // Beyond its opening a valve has 2 up down / (up + down) of that more: both gains are in it.
+    const double open = null ? 0.0
+                             : std::copysign(2.0 * servo.opening(i) * up * down, E(i)) /
+                                   ((up + down) * (up + down));
     const double follows = std::abs(E(i)) < servo.rail ? K : 0.0;
     const auto change = [&](const Sensitivity& s) {
       return -follows * (s.L(i) + (servo.derivative - servo.reading_age) * s.v(i));
     };
-    extend_.v_end(i) = change(extend_) + (extends ? K * E(i) : 0.0);
-    retract_.v_end(i) = change(retract_) + (extends ? 0.0 : K * E(i));
+    extend_.v_end(i) = change(extend_) + (null || extends ? up * E(i) : 0.0) + down * open;
+    retract_.v_end(i) = change(retract_) + (null || !extends ? down * E(i) : 0.0) + up * open;
   }
 }
 

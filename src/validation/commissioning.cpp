@@ -52,6 +52,18 @@ Value without(Value document, std::initializer_list<const char*> keys) {
   return document;
 }
 
+/// The shakes and the first slow moves after them.
+Series movesIn(const Series& series) {
+  constexpr double kLongest = 20.0;  // [s]
+  Series out;
+  out.experiment = series.experiment;
+  for (const Row& row : series.rows)
+    if (row.state.segment >= kFirstShake &&
+        (out.rows.empty() || row.t - out.rows.front().t < kLongest))
+      out.rows.push_back(row);
+  return out;
+}
+
 /// The shakes alone, with the masses and the bias that have been found.
 Series shakesIn(const Series& series, const Commissioned& found) {
   Series out;
@@ -195,7 +207,7 @@ Commissioned commissioned(const Series& series, const Commissioning& commissioni
     out.no_masses = commissioning.no_plan;
   }
   try {
-    out.servo = identifiedServo(shakesIn(series, out));
+    out.servo = identifiedServo(movesIn(series), shakesIn(series, out));
   } catch (const std::domain_error& why) {
     out.no_servo = why.what();
   }
@@ -248,6 +260,7 @@ std::optional<ErrorForecast> forecastError(const Experiment& scenario, const Exp
          "machine.switches=simulated",
          "controller.stability=forced"});  // whether it may is said beside it
     e.plant.payload = m.payload;
+    if (!e.plant.hydraulic) e.controller.servo.opening.setZero();  // ideal valves just close
     const RecordedRun run = recordLockstep(e);
     const auto summary = summarise(run.series, run.result);
     if (!summary.contains("emulation_error_position_share")) return {};
@@ -372,6 +385,11 @@ std::vector<Table> tablesOf(const Series& series, const Commissioning& commissio
       servo.rows.push_back({fmt::format("{}", i + 1), cell(&ServoModel::extend, i, 1.0),
                             cell(&ServoModel::retract, i, 1.0), cell(&ServoModel::tau, i, 1e3),
                             cell(&ServoModel::delay, i, 1e3)});
+    if (!f.servo->legs.servo.opening.isZero(0.0)) {
+      servo.header.push_back("valve open at null [um]");
+      for (int i = 0; i < kLegs; ++i)
+        servo.rows[static_cast<std::size_t>(i)].push_back(cell(&ServoModel::opening, i, 1e6));
+    }
     const auto& sensor = f.servo->sensor;
     servo.note = sensor ? fmt::format(
                               "The wrench comes {:.0f} +- {:.0f} us later than the servos "

@@ -96,6 +96,19 @@ std::vector<std::string> drawSettings(Dice& dice, const Scenario& scenario) {
       put("legs.hydraulic.breakaway_n", "750");
     }
     maybe(0.3, "legs.hydraulic.reading_noise_m", "0.00002");
+    // What a servo identification says of it: gains of the data sheet, valves open at null.
+    if (dice.chance(0.5)) {
+      const auto all = [](const char* key, double value, double deviation) {
+        return fmt::format(
+            "{0}: [{1}, {1}, {1}, {1}, {1}, {1}], {0}_deviation: [{2}, {2}, {2}, {2}, "
+            "{2}, {2}], ",
+            key, value, deviation);
+      };
+      put("servo", "{date: \"2026-11-21T07:40:12Z\", " + all("extend_per_s", 17.4, 0.1) +
+                       all("retract_per_s", 11.35, 0.1) + all("tau_s", 0.0064, 1e-4) +
+                       all("delay_s", 0.0, 1e-4) + all("opening_m", dice.between(0.0, 3e-4), 1e-5) +
+                       "}");
+    }
   } else {
     maybe(0.25, "legs.filters", "outputs");
   }

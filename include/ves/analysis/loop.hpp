@@ -85,8 +85,12 @@ struct Uncertainty {
 Loop off(Loop loop, const Uncertainty& by, int timing, int gain);
 
 /// The gain of a leg depends on which way it moves. A leg that swings has the harmonic mean, as
-/// long as its speed is nearly a sine.
-enum class Direction { kExtending, kRetracting, kSwinging };
+/// long as its speed is nearly a sine. Near null both edges of valves that are open there pass.
+enum class Direction { kExtending, kRetracting, kSwinging, kNearNull };
+const char* name(Direction direction);
+
+/// Those for which a loop is judged: both ways, and near null where that is another gain.
+std::vector<Direction> directionsOf(const ControllerConfig& controller);
 
 /// The loop as the controller believes it: servos and sensor by its servo model, the robot by its
 /// payload, the joints at q.

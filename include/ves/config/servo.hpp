@@ -13,7 +13,7 @@ namespace ves {
 
 struct ServoRecord {
   std::int64_t date = 0;  // [s] since 1970, UTC
-  ServoModel servo;       // extend, retract, tau, delay; of the sensor, delay and scale
+  ServoModel servo;       // extend, retract, tau, delay, opening; of the sensor, delay and scale
   ServoModel deviation;   // standard, of the same
 };
 

@@ -10,6 +10,9 @@
 //
 // K [1/s] depends on the sign of E. A LegSlave compares every `update`; it reads the length a
 // before that, and r reaches it `delay` after the tick that sent it.
+//
+// Where both edges of a valve are open at null, by an E of `opening`, both pass for small E: there
+// v_end = (K_extend + K_retract) E, and beyond K (E + what is open).
 #pragma once
 
 #include "ves/contract/leg_communication.hpp"
@@ -24,6 +27,7 @@ struct ServoModel {
   Vec6 retract = Vec6::Zero();  // [1/s] and for E < 0
   Vec6 tau = Vec6::Zero();      // [s]
   Vec6 delay = Vec6::Zero();    // [s]
+  Vec6 opening = Vec6::Zero();  // [m] of both edges at null
   double derivative = 0.0;      // [s] d
   double update = 0.0;          // [s]
   double reading_age = 0.0;     // [s] a
@@ -37,6 +41,12 @@ struct ServoModel {
   LegCodec readings;            // of the transducers
   double jitter = 0.0;          // [s] by which the time of a reading may be wrong
 };
+
+/// [m/s] v_end of leg i for E [m], and E for v_end: the same curve, which rises all the way.
+double speedOf(const ServoModel& servo, int i, double E) noexcept;
+double differenceOf(const ServoModel& servo, int i, double v_end) noexcept;
+/// True where both edges of leg i's valve pass.
+bool nearNull(const ServoModel& servo, int i, double E) noexcept;
 
 /// [s] by which a wrench is late where the admittance model uses it: the sensor's filter, its mean,
 /// and half of the period for which it is held.

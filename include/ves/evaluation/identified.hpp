@@ -39,8 +39,9 @@ struct IdentifiedServo {
   ServoRecord record;
 };
 
-/// From the longest stretch under command without a gap, which moves every leg both ways. Throws
-/// std::domain_error where it does not tell.
-IdentifiedServo identifiedServo(const Series& series);
+/// The legs from the longest stretch of `moves` under command without a gap, which moves every leg
+/// both ways, or of `shakes` where no valve is found open; the sensor from `shakes`, during which
+/// the robot stands still. Throws std::domain_error where they do not tell.
+IdentifiedServo identifiedServo(const Series& moves, const Series& shakes);
 
 }  // namespace ves
