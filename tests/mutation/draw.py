@@ -16,7 +16,8 @@ from clang.cindex import TypeKind as T
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 SOURCE = ROOT / "build" / "mutation" / "source"  # the project when the mutants were drawn
-MODULES = ["math", "kinematics", "robot", "control", "plant", "srms", "analysis", "identification"]
+MODULES = ["math", "kinematics", "robot", "contract", "control", "bus", "contact", "planning", "plant",
+           "srms", "analysis", "identification", "run", "evaluation", "acceptance"]
 RELATIONS = {"<": "<=", "<=": "<", ">": ">=", ">=": ">", "==": "!=", "!=": "=="}
 ARITHMETIC = {T.BOOL, T.INT, T.UINT, T.LONG, T.ULONG, T.LONGLONG, T.ULONGLONG, T.SHORT, T.USHORT,
               T.CHAR_S, T.SCHAR, T.UCHAR, T.DOUBLE, T.FLOAT}
@@ -49,6 +50,22 @@ def canonical(cursor):
 
 def is_number(cursor):
     return canonical(cursor).kind in ARITHMETIC
+
+
+def is_rotation(cursor):
+    return "Eigen::Matrix<double, 3, 3" in canonical(cursor).spelling
+
+
+def sibling(field):
+    """The next field of the same type in the same struct, in a ring; none: there is no other."""
+    if field is None or field.kind != K.FIELD_DECL:
+        return None
+    fields = [c for c in field.semantic_parent.get_children() if c.kind == K.FIELD_DECL]
+    kind = field.type.get_canonical().spelling
+    alike = [c.spelling for c in fields if c.type.get_canonical().spelling == kind]
+    if len(alike) < 2:
+        return None
+    return alike[(alike.index(field.spelling) + 1) % len(alike)]
 
 
 def is_eigen(cursor):
@@ -88,8 +105,46 @@ class Finder:
                 return
         if cursor.kind == K.FIELD_DECL:  # a default value; what it is then is configuration
             return
+        if cursor.kind == K.COMPOUND_STMT:
+            self.neighbours(list(cursor.get_children()))
+        if cursor.kind in (K.FUNCTION_DECL, K.CXX_METHOD) and canonical(cursor).spelling.startswith("void "):
+            self.early_return(cursor)
         for child in cursor.get_children():
             self.visit(child, cursor)
+
+    def is_call(self, cursor):
+        """A statement that can change places with another: a call or an assignment by itself."""
+        b = span(cursor)[1]
+        return cursor.kind in (K.CALL_EXPR, K.BINARY_OPERATOR) and self.text[b:b + 1] == ";"
+
+    def neighbours(self, statements):
+        for one, two in zip(statements, statements[1:]):
+            if not (self.is_call(one) and self.is_call(two)):
+                continue
+            (a0, b0), (a1, b1) = span(one), span(two)
+            if "assert" not in self.text[a0:b1] and self.share(self.text[a0:b0], self.text[a1:b1]):
+                self.add(a0, b1, "two statements exchanged",
+                         "if (::ves_m(@)) { {}; {}; } else { {}; {}; }",
+                         (a1, b1), (a0, b0), (a0, b0), (a1, b1))
+
+    @staticmethod
+    def share(one, two):
+        """One of them changes what the other names: else their order has no meaning."""
+        def names(text):
+            return set(re.findall(r"[A-Za-z_]\w{2,}", text)) - {"std", "Zero", "move"}
+
+        def changed(text):
+            return set(re.findall(r"([A-Za-z_]\w{2,})(?:\([^()]*\)|\[[^\]]*\])?\s*[-+*/|&]?=[^=]", text)) | \
+                set(re.findall(r"([A-Za-z_]\w{2,})\.\w+\(", text))
+        return bool(changed(one) & names(two) or changed(two) & names(one))
+
+    def early_return(self, function):
+        body = [c for c in function.get_children() if c.kind == K.COMPOUND_STMT]
+        statements = list(body[0].get_children()) if body else []
+        for k, one in enumerate(statements[1:], start=1):
+            a, b = span(one)
+            if one.kind != K.DECL_STMT and a < b and k == len(statements) - 1:
+                self.add(a, a, "early return", "if (::ves_m(@)) return; ")
 
     def visit(self, cursor, parent):
         here = cursor.location.file
@@ -127,8 +182,27 @@ class Finder:
             if len(parts) == 3:
                 (a0, b0), (a1, b1), (a2, b2) = map(span, parts)
                 self.add(a0, b0, "choice swapped", "(::ves_m(@) != ({}))", (a0, b0))
+        elif kind == K.CALL_EXPR and cursor.spelling == "transpose" and text.endswith(".transpose()"):
+            inner = a, b - len(".transpose()")
+            if is_rotation(next(cursor.get_children())) or is_rotation(cursor):
+                self.add(a, b, "transpose dropped",
+                         "::ves::Mat3(::ves_m(@) ? ::ves::Mat3({}) : ::ves::Mat3(({}).transpose()))",
+                         inner, inner)
+        elif kind == K.MEMBER_REF_EXPR:
+            self.member(cursor, a, b, text)
         elif kind == K.CALL_EXPR and cursor.spelling in ("min", "max", "sin", "cos", "abs"):
             self.function(cursor, a, b)
+
+    def member(self, cursor, a, b, text):
+        other = sibling(cursor.referenced)
+        name = cursor.spelling
+        if other is None or not text.endswith(name) or self.text[b:b + 1] == "(":
+            return
+        before = text[:len(text) - len(name)]
+        if before.endswith("::"):
+            return
+        self.add(a, b, f"{name} for {other}",
+                 f"(::ves_m(@) ? {before}{other} : {before}{name})")
 
     def condition(self, cursor):
         parts = [c for c in cursor.get_children()]
@@ -165,6 +239,9 @@ class Finder:
             self.add(a, b, f"{between} to {other}", choice(other), *sides)
             self.add(a, b, f"term after {between} dropped",
                      f"(::ves_m(@) ? ({{}}) + 0 * ({{}}) : ({{}}) {between} ({{}}))", *sides)
+        elif between == "*" and re.fullmatch(r"k[A-Z]\w*", self.source(a1, b1)) and is_number(left):
+            self.add(a, b, f"factor {self.source(a1, b1)} lost",
+                     "(::ves_m(@) ? 1.0 * ({}) : ({}) * ({}))", (a0, b0), (a0, b0), (a1, b1))
         elif between in ("*", "/") and is_number(left) and is_number(right):
             other = "/" if between == "*" else "*"
             self.add(a, b, f"{between} to {other}", choice(other), *sides)
@@ -233,9 +310,11 @@ def sources(module):
 def find(path):
     """All mutants of one source file."""
     flags = ["-xc++", "-std=c++20", f"-I{SOURCE}/include", "-I/usr/include/eigen3",
+             f"-I{SOURCE.parent}/build/lcmtypes", f"-I{ROOT}/build/release/lcmtypes",
+             f"-I{path.parent}", "-DEIGEN_MAX_ALIGN_BYTES=16", "-DFMT_SHARED", "-include", "optional",
              "-isystem", "/usr/lib/llvm-14/lib/clang/14.0.6/include"]
     unit = ci.Index.create().parse(str(path), args=flags)
-    fatal = [d for d in unit.diagnostics if d.severity >= 3]
+    fatal = [d for d in unit.diagnostics if d.severity >= 4]  # clang 14 is stricter than g++ here and there
     if fatal:
         sys.exit(f"{path}: {fatal[0].spelling}")
     finder = Finder(path, path.read_text())
@@ -244,11 +323,11 @@ def find(path):
     return list({(m.start, m.end, m.what): m for m in finder.found}.values())
 
 
-def find_all():
-    paths = [(module, path) for module in MODULES for path in sources(module)]
+def find_all(modules):
+    paths = [(module, path) for module in modules for path in sources(module)]
     with multiprocessing.Pool() as pool:
         found = pool.map(find, [path for _, path in paths], chunksize=1)
-    out = {module: [] for module in MODULES}
+    out = {module: [] for module in modules}
     for (module, _), mutants in zip(paths, found):
         out[module] += mutants
     return out
@@ -257,24 +336,44 @@ def find_all():
 def draw(found, count, seed):
     """So many mutants in all, by the modules' shares; never two at exactly one place.
 
+    The random ones of an operator are as many as any other's: there are a hundred exchanged fields
+    for an early return.
+
     A mutant's lot depends on its own line alone: an edit elsewhere does not draw anew.
     """
     total = sum(len(v) for v in found.values())
     chosen = []
     for module, mutants in found.items():
         met = collections.Counter()
-        lots = []
+        by_kind = collections.defaultdict(list)
         for m in mutants:
             key = f"{seed} {m.file} {m.line_text} {m.text} {m.what}"
             met[key] += 1
-            lots.append((hashlib.sha256(f"{key} {met[key]}".encode()).digest(), m))
+            lot = hashlib.sha256(f"{key} {met[key]}".encode()).digest()
+            by_kind[kind_of(m.what)].append((lot, m))
+        for lots in by_kind.values():
+            lots.sort(key=lambda lot: lot[0], reverse=True)
         wanted, taken = max(20, round(count * len(mutants) / total)), set()
-        for _, m in sorted(lots, key=lambda lot: lot[0]):
-            if wanted and (m.file, m.start, m.end) not in taken:
-                taken.add((m.file, m.start, m.end))
-                chosen.append((module, m))
-                wanted -= 1
+        kinds = sorted(by_kind, key=lambda kind: hashlib.sha256(f"{seed} {kind}".encode()).digest())
+        while wanted and any(by_kind.values()):
+            for kind in kinds:
+                if not (wanted and by_kind[kind]):
+                    continue
+                _, m = by_kind[kind].pop()
+                if (m.file, m.start, m.end) not in taken:
+                    taken.add((m.file, m.start, m.end))
+                    chosen.append((module, m))
+                    wanted -= 1
     return chosen
+
+
+def kind_of(what):
+    """What operator an error is of, whatever it is applied to."""
+    for kind in ("dropped", "exchanged", "early return", "left out", "never true", "swapped", "lost",
+                 "reversed", " for "):
+        if kind in what:
+            return kind
+    return "number" if re.match(r"[0-9]", what) else "symbol"
 
 
 def render(text, mutants):

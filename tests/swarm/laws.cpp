@@ -38,6 +38,7 @@ Laws::Laws(const Experiment& experiment, const std::string& only)
       checks_(c_.safety, c_.geometry),
       period_(c_.periodSeconds()),
       count_(c_.legs.scale.maxCoeff()),
+      at_rest_(2.0 * count_),
       L_home_(legLengths(c_.geometry, c_.geometry.fromHome(Pose()))),
       only_(only) {
   if (!experiment.plant.hydraulic || c_.resonance.frequency == 0.0) return;
@@ -45,6 +46,9 @@ Laws::Laws(const Experiment& experiment, const std::string& only)
   const plant::HydraulicLegModel& leg = experiment.plant.hydraulic->leg;
   const plant::CylinderModel& c = leg.cylinder;
   const double middle = leg.oil.hoses + 0.5 * c.bore * (c.length_max - c.length_min);
+  // In its most crooked poses the robot's weight pulls a leg with all that its oil can hold.
+  constexpr double kOverpowered = 1e-3;  // [m]
+  at_rest_ += c.play + kOverpowered;
   slips_ = c.play + 2.0 * leg.seals.breakaway * middle / (leg.oil.bulk_modulus * c.bore * c.bore);
 }
 
@@ -300,10 +304,11 @@ void Laws::follow(std::int64_t time, const plant::Truth& truth, const Taken& tak
     frozen_time_ = time;
     const Vec6 from = truth.legs.L - anchor_;
     // The servo's own: of a speed that it has to lose, and of a step that it has to make. What
-    // gives way swings on, and six modes add up in a leg.
+    // gives way swings on, six modes add up in a leg, and each leg feels what the others lose.
     const double modes = std::sqrt(6.0) * swings_;
     const Vec6 overshoot = Vec6::Constant(2.0 * count_ + slips_) +
-                           (0.010 + modes) * truth.legs.L_dot.cwiseAbs() +
+                           0.010 * truth.legs.L_dot.cwiseAbs() +
+                           Vec6::Constant(modes * truth.legs.L_dot.cwiseAbs().maxCoeff()) +
                            modes * swings_ * truth.legs.L_ddot.cwiseAbs() +
                            overshootOfAStep(c_.servo) * from.cwiseAbs();
     frozen_low_ = from.cwiseMin(0.0) - overshoot;
@@ -323,7 +328,7 @@ void Laws::frozen(std::int64_t time, const plant::Truth& truth) {
                        "lengths",
                        static_cast<double>(time - frozen_time_) * 1e-9,
                        legText(beyond.cwiseMax(0.0)), legText(off)));
-  if (time - frozen_time_ > kSecond && !(off.cwiseAbs().maxCoeff() <= 2.0 * count_))
+  if (time - frozen_time_ > kSecond && !(off.cwiseAbs().maxCoeff() <= at_rest_))
     broken("rest", fmt::format("stopped, and {} from the last checked lengths", legText(off)));
 }
 
@@ -335,7 +340,7 @@ void Laws::alone(std::int64_t time, const plant::Truth& truth) {
     alone_from_ = L;
     if (time - engaged_time_ < watchdog.park_after && time - engaged_time_ < 2 * kSecond) {
       const Vec6 off = L - anchor_;
-      if (!(off.cwiseAbs().maxCoeff() <= 2.0 * count_))
+      if (!(off.cwiseAbs().maxCoeff() <= at_rest_))
         broken("rest", fmt::format("a second after the last command {} from its checked lengths",
                                    legText(off)));
     }

@@ -80,6 +80,7 @@ class Laws {
   const ControllerConfig& c_;
   PathChecks checks_;
   double period_, count_;  // [s], [m]
+  double at_rest_;         // [m] off the checked lengths
   // Legs that give way: 1/w of the lowest mode; their play, and how far their oil is bent when
   // seals break away.
   double swings_ = 0.0, slips_ = 0.0;  // [s], [m]

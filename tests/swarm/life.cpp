@@ -84,8 +84,10 @@ std::vector<std::string> drawSettings(Dice& dice, const Scenario& scenario) {
     put("controller.period_ns", dice.of(kPeriods));
   }
   maybe(0.3, "sensor.readings_per_tick", "4");
-  // The cylinders of config/ves.yaml are none of a desk's.
-  if (scenario.name != std::string_view("arm_on_desk") && dice.chance(0.2)) {
+  // The cylinders of config/ves.yaml are none of a desk's, and none of a hall's.
+  const bool own_size = scenario.name != std::string_view("arm_on_desk") &&
+                        scenario.name != std::string_view("puma_on_hall");
+  if (own_size && dice.chance(0.2)) {
     put("legs.model", "hydraulic");
     put("legs.hydraulic.circuit", dice.chance(0.7) ? "three_way" : "four_way");
     // On the Shuttle's arm soft oil diverges within a second; what then stops is no longer a law's.
