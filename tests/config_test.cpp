@@ -676,6 +676,11 @@ TEST(Config, WhatGivesWayIsToldOrFollowsFromTheSimulatedLegs) {
               resonance({"machine.resonance.lowest_hz=15"});
             }).find("machine.resonance.damping_ratio"),
             std::string::npos);
+  for (const char* unused :
+       {"machine.resonance.damping_ratio=0.05", "machine.resonance.pressure_feedback_per_s=50"})
+    EXPECT_NE(refusal([&] { resonance({unused}); }).find("machine.resonance.lowest_hz"),
+              std::string::npos)
+        << unused;
 }
 
 TEST(Config, ExcitationsThatFillAProgramAreRefused) {

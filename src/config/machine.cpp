@@ -247,6 +247,11 @@ MachinePieces readMachine(Section s, std::int64_t controller_period, Resonance& 
     resonance.feedback = told.numberOr("pressure_feedback_per_s", 0.0, 1e5, resonance.feedback);
     resonance.feedback_time =
         told.numberOr("pressure_feedback_s", 1e-3, 10.0, resonance.feedback_time);
+    if (!derived && resonance.frequency == 0.0 &&
+        (resonance.damping != 1.0 || resonance.feedback != 0.0))
+      told.fail("lowest_hz",
+                "nothing gives way here, want it above 0 beside damping_ratio or "
+                "pressure_feedback_per_s");
     told.finish();
   }
   s.finish();
