@@ -56,6 +56,20 @@ TEST_F(SafetyChecks, PositionError) {  // scaled with speed
   }
 }
 
+TEST_F(SafetyChecks, EveryLegsJointsHaveACone) {
+  // Either joint of one leg alone is elsewhere: that leg leans, the others as they did.
+  const JointAxes axes(g_);
+  for (std::size_t i = 0; i < kLegs; ++i)
+    for (const bool base : {true, false}) {
+      Geometry leans = g_;
+      (base ? leans.p_IBi_I : leans.p_PPi_P)[i] += Vec3(0.9, 0.9, 0.0);
+      SafetyLimits limits = l_;
+      limits.joint_cone = 25 * kDegree;
+      EXPECT_TRUE(axes.check(limits, g_, g_.fromHome({})));
+      EXPECT_FALSE(axes.check(limits, leans, g_.fromHome({}))) << "leg " << i + 1;
+    }
+}
+
 TEST_F(SafetyChecks, MotionLimits) {
   for (int i = 0; i < 6; ++i) {
     const double limit = i < 3 ? 0.305 : 30 * kDegree;

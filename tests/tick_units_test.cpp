@@ -282,6 +282,27 @@ TEST(StaticLoad, GoesThroughTheSensorsFilterByTheShareOnly) {
   EXPECT_LT((published.wrench().stacked() - all.wrench().stacked()).norm(), 1e-6);
 }
 
+// While nobody commands the legs, weight has no past: armed again, it is what it is now.
+TEST(StaticLoad, BeginsAnewAtTheWeightOfTheTime) {
+  ControllerConfig config = puma();
+  config.compensation.inertia = config.compensation.observer = true;
+  const Mat3 level = Mat3::Identity(), tilted = rotation({0.3, 0.0, 0.0});
+  const JointVector q = JointVector::Zero();
+  const KnownPayload known(config);
+  StaticLoad again(config), first(config);
+  again.update(known, q, level, 0.01, false, 0.0);
+  for (int n = 0; n < 50; ++n) again.update(known, q, level, 0.01, true, 1.0);
+  for (StaticLoad* load : {&again, &first}) {
+    load->update(known, q, tilted, 0.01, false, 0.0);
+    load->update(known, q, tilted, 0.01, true, 1.0);
+  }
+  EXPECT_LT((again.wrench().stacked() - first.wrench().stacked()).norm(), 1e-12);
+  EXPECT_LT((again.wrench().stacked() -
+             staticWrench(known.payload(), q, tilted, config.gravity).stacked())
+                .norm(),
+            1e-9);
+}
+
 // Each change of the gripper's switch is told once, in its tick; where it stands at first is none.
 TEST(KnownPayload, KnowsThatTheGripperMovedByItsSwitch) {
   for (const bool switched : {false, true}) {

@@ -119,11 +119,16 @@ SecondOrderHold HydraulicLeg::prepare(double dt) const noexcept {
   return discretise(w * w, 2.0 * model_.valve.damping * w, dt);
 }
 
+double boreVolume(const HydraulicLegModel& leg, double length) noexcept {
+  return leg.oil.hoses + leg.cylinder.bore * (length - leg.cylinder.length_min);
+}
+
+double rodVolume(const HydraulicLegModel& leg, double length) noexcept {
+  return leg.oil.hoses + leg.cylinder.rod_side * (leg.cylinder.length_max - length);
+}
+
 double HydraulicLeg::volume(std::size_t chamber, double y) const noexcept {
-  const CylinderModel& c = model_.cylinder;
-  const double stroke =
-      chamber == 0 ? c.bore * (y - c.length_min) : c.rod_side * (c.length_max - y);
-  return model_.oil.hoses + stroke;
+  return chamber == 0 ? boreVolume(model_, y) : rodVolume(model_, y);
 }
 
 /// (2.11) of a chamber at the pressure p, its spool `towards` the supply.

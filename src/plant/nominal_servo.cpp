@@ -61,10 +61,8 @@ Resonance nominalResonance(const HydraulicModel& hydraulic, const ActuatorModel&
   const double L = home.L.mean(), p_S = leg.oil.supply;
   const bool four_way = leg.valve.circuit == Circuit::kFourWay;
   const double stiffens[] = {
-      leg.oil.bulk_modulus * c.bore / (leg.oil.hoses + c.bore * (L - c.length_min)),
-      four_way
-          ? leg.oil.bulk_modulus * c.rod_side / (leg.oil.hoses + c.rod_side * (c.length_max - L))
-          : 0.0};
+      leg.oil.bulk_modulus * c.bore / boreVolume(leg, L),
+      four_way ? leg.oil.bulk_modulus * c.rod_side / rodVolume(leg, L) : 0.0};
   const double k = c.bore * stiffens[0] + c.rod_side * stiffens[1];  // [N/m]
   const double p_1 = p_S * c.rod_side / (four_way ? c.bore + c.rod_side : c.bore),
                root_1 = std::sqrt(p_1), root_2 = std::sqrt(p_S - p_1),

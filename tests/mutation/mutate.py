@@ -100,7 +100,10 @@ def build(_):
             print(f"built; {len(dropped)} mutants are not C++")
             return
         bad = set()
-        for file, line in re.findall(r"^(\S+?):(\d+):\d+: error", made.stdout, re.M):
+        for file, line in re.findall(r"^(\S+?):(\d+):\d+:\s+(?:error|required from)",
+                                     made.stdout, re.M):
+            if not file.startswith(str(TREE)):
+                continue
             lines = pathlib.Path(file).read_text().splitlines()
             for k in range(max(0, int(line) - 2), min(len(lines), int(line) + 1)):
                 bad |= {int(n) for n in re.findall(r"ves_[mf]\((\d+)", lines[k])}

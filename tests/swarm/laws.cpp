@@ -45,7 +45,7 @@ Laws::Laws(const Experiment& experiment, const std::string& only)
   swings_ = 1.0 / c_.resonance.frequency;
   const plant::HydraulicLegModel& leg = experiment.plant.hydraulic->leg;
   const plant::CylinderModel& c = leg.cylinder;
-  const double middle = leg.oil.hoses + 0.5 * c.bore * (c.length_max - c.length_min);
+  const double middle = plant::boreVolume(leg, 0.5 * (c.length_min + c.length_max));
   // In its most crooked poses the robot's weight pulls a leg with all that its oil can hold.
   constexpr double kOverpowered = 1e-3;  // [m]
   at_rest_ += c.play + kOverpowered;

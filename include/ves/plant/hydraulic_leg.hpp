@@ -83,6 +83,10 @@ struct HydraulicLegModel {
   double flow = 0.0;  // [m^3/s/A/sqrt(Pa)]
 };
 
+/// [m^3] of oil before and behind a piston whose leg is `length` [m] long.
+double boreVolume(const HydraulicLegModel& leg, double length) noexcept;
+double rodVolume(const HydraulicLegModel& leg, double length) noexcept;
+
 /// Areas and flow coefficient with which the leg goes as fast as (2.17) says, both ways, at
 /// `current` [A] under `load` [N] (pressing on it), and the null of that load; what leaks past the
 /// piston is not counted. False where no area does.
