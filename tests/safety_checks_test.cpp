@@ -70,6 +70,26 @@ TEST_F(SafetyChecks, EveryLegsJointsHaveACone) {
     }
 }
 
+TEST_F(SafetyChecks, EveryLegAndEveryPairOfThemIsKeptClear) {
+  const Transform home = g_.fromHome({});
+  ASSERT_TRUE(collideCheck(l_, g_, home));
+  SafetyLimits slopes = l_, distances = l_;
+  slopes.leg_clearance = 0.0;
+  distances.plate_angle = 0.0;
+  for (std::size_t i = 0; i < kLegs; ++i) {
+    Geometry flat = g_;  // one leg alone, far out: nearly level
+    flat.p_IBi_I[i] += 40.0 * flat.p_IBi_I[i].normalized();
+    EXPECT_FALSE(collideCheck(slopes, flat, home)) << "leg " << i + 1;
+    for (std::size_t j = i + 1; j < kLegs; ++j) {
+      Geometry near = g_;  // one beside the other
+      const Vec3 beside(0.1 * l_.leg_clearance, 0.0, 0.0);
+      near.p_IBi_I[j] = g_.p_IBi_I[i] + beside;
+      near.p_PPi_P[j] = g_.p_PPi_P[i] + beside;
+      EXPECT_FALSE(collideCheck(distances, near, home)) << "legs " << i + 1 << " and " << j + 1;
+    }
+  }
+}
+
 TEST_F(SafetyChecks, MotionLimits) {
   for (int i = 0; i < 6; ++i) {
     const double limit = i < 3 ? 0.305 : 30 * kDegree;
