@@ -100,7 +100,12 @@ TEST_F(Commission, ItsBiasNeedsNoCalibrationAfterwards) {
 TEST_F(Commission, FindsHowFarValvesAreOpenAtNull) {
   // An E at null lets through what a current does: the D/A's volts and amperes of a count.
   const std::vector<std::string> hydraulic = with(kCompensated, "legs.model=hydraulic");
-  for (const double open_ma : {0.1, 0.3, 0.0, -0.2}) {
+#ifdef VES_SANITIZE  // each takes half a minute there
+  const std::vector<double> openings = {0.3};
+#else
+  const std::vector<double> openings = {0.1, 0.3, 0.0, -0.2};
+#endif
+  for (const double open_ma : openings) {
     const std::vector<std::string> sets =
         with(hydraulic, fmt::format("legs.hydraulic.valve_opening_ma={}", open_ma));
     const Experiment told = loadExperiment(scenario("puma_on_table_4_1"), sets);
