@@ -14,7 +14,7 @@ namespace {
 struct Wanted {
   AcceptanceOptions tests;
   std::vector<std::string> coordinates, parts;
-  std::string limits;
+  std::string limits, command;
   bool moves = false;
 };
 
@@ -28,9 +28,11 @@ std::vector<int> coordinatesOf(const std::vector<std::string>& names) {
 
 std::vector<std::string> conditionsOf(const RunnerOptions& options, const Wanted& wanted,
                                       const Experiment& e, double seconds) {
-  const std::string how = wanted.moves               ? "the machine on " + options.process.url
-                          : options.process.lockstep ? "simulated, in lockstep"
-                                                     : "simulated, in real time";
+  const std::string how =
+      wanted.moves
+          ? "the machine on " + options.process.url
+          : fmt::format("simulated on {} legs, in {}", e.plant.hydraulic ? "hydraulic" : "ideal",
+                        options.process.lockstep ? "lockstep" : "real time");
   const Compensation& c = e.controller.compensation;
   std::string compensation;
   for (const auto& [on, name] : {std::pair(c.feed_forward, "feed_forward"),
@@ -40,8 +42,7 @@ std::vector<std::string> conditionsOf(const RunnerOptions& options, const Wanted
   const double load =
       compositeBody(carried(e.controller.payload), e.plant.task.initial_joints).mass;
   return {
-      fmt::format("Machine: {} ({}), {}; {:.0f} s of its time; compensation: {}.", e.name,
-                  e.plant.hydraulic ? "hydraulic legs" : "ideal legs", how, seconds,
+      fmt::format("Machine: {}, {}; {:.0f} s of its time; compensation: {}.", e.name, how, seconds,
                   compensation.empty() ? "none" : compensation),
       fmt::format("On the force sensor stand {:.1f} kg, as believed; the robot does not move. "
                   "Accelerations are what that load weighs more or less, by the sensor; a wrong "
@@ -71,7 +72,7 @@ int accept(RunnerOptions& options, Wanted& wanted) {
     seconds += tests.back().seconds;
   }
   if (!options.quiet) {
-    fmt::print("{} coordinates, about {:.0f} s of the machine's time\n", tests.size(), seconds);
+    fmt::print("about {:.0f} s of the machine's time\n", seconds);
     std::fflush(stdout);
   }
   const std::filesystem::path folder =
@@ -104,13 +105,9 @@ int accept(RunnerOptions& options, Wanted& wanted) {
   const std::vector<AcceptanceVerdict> verdicts = judge(limits, found);
   std::vector<std::string> conditions = conditionsOf(options, wanted, scenario, seconds);
   if (!stopped.empty()) conditions.push_back("Not to its end: " + stopped + ".");
-  std::string command = "./ves accept " + options.scenario;
-  for (const std::string& one : options.overrides) command += " --set " + one;
-  if (wanted.moves) command += " --move";
-  if (options.process.lockstep) command += " --lockstep";
   writeFile(folder / "accept.csv", acceptanceCsv(found));
   writeFile(folder / "accept.html",
-            acceptancePage(tests, found, verdicts, conditions, command)
+            acceptancePage(tests, found, verdicts, conditions, wanted.command)
                 .html("Acceptance of " + scenario.name,
                       fmt::format("{}; {}", dateText(std::time(nullptr)), describeBuild())));
   if (!options.quiet) {
@@ -179,6 +176,12 @@ int acceptCommand(int argc, char** argv) {
   cli.add_option("--slow", wanted.tests.slow, "pace of the passes for the hysteresis [m/s]")
       ->check(inRange(1e-4, 0.01))
       ->capture_default_str();
+  wanted.command = "./ves accept";
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    const bool plain = word.find_first_of(" {}[]*?$'\"\\") == std::string::npos;
+    wanted.command += plain ? " " + word : " '" + word + "'";
+  }
   return run(cli, argc, argv, [&] {
     const auto rising = [](const std::vector<double>& all, double sign) {
       for (std::size_t i = 1; i < all.size(); ++i)

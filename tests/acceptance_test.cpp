@@ -252,6 +252,26 @@ TEST(Acceptance, RecoversWhatMachinesWereDrawnWith) {
   holds(corner, 0.03, "corner");
 }
 
+TEST(Acceptance, FeelsTheLoadInThePoseThatTheMachineTells) {
+  // The robot stands elsewhere than the scenario says; what is felt then follows what is done.
+  const std::vector<std::string> sets = {"sensor.noise=false", "gravity_m_per_s2=0"};
+  AcceptanceOptions options;
+  options.frequencies = {1};
+  options.amplitudes = {1.0};
+  options.passes = options.steps = false;
+  const AcceptanceTest test =
+      acceptanceTest(test::experiment("puma_on_table_4_1", sets), 4, options);
+  Experiment elsewhere = test.experiment;
+  elsewhere.plant.task.initial_joints(1) += 1.2;
+  Series run = recordLockstep(elsewhere).series;
+  const auto bump = [&](const Series& series) {
+    return find(measurementsOf(series, test), Quantity::kTurnAround)->estimate.value;
+  };
+  const double as_it_stands = bump(run);
+  run.experiment.plant.task.initial_joints = test.experiment.plant.task.initial_joints;
+  EXPECT_EQ(bump(run), as_it_stands);  // what the simulation begins with is nobody's to know
+}
+
 TEST(Acceptance, FindsTheServoThatItsEquationsSay) {
   // (2.17) behind a LegSlave, alike both ways: K e^-sD / (s (1 + tau s) + K e^-s(D-A)), and half a
   // period of the held command in D.
@@ -319,6 +339,11 @@ TEST(Acceptance, SaysWhatARunThatWasCutOffDoesNotTell) {
   EXPECT_FALSE(find(first, Quantity::kThreshold));
   EXPECT_TRUE(find(after(1e9), Quantity::kThreshold));
   EXPECT_TRUE(after(1e9).missing.empty());
+  Series moved = whole;  // the load did not stay what it was
+  moved.rows[moved.rows.size() / 2].sample.q[1] += 0.1;
+  EXPECT_FALSE(find(measurementsOf(moved, test), Quantity::kThreshold));
+  EXPECT_TRUE(find(measurementsOf(moved, test), Quantity::kGain));
+  EXPECT_NE(measurementsOf(moved, test).missing.front().find("the robot moved"), std::string::npos);
   Series deaf = whole;  // no sample came
   for (Row& row : deaf.rows) row.has_sample = false;
   EXPECT_TRUE(measurementsOf(deaf, test).all.empty());

@@ -16,25 +16,6 @@ const QuantityMeaning& meaningOf(Quantity quantity) {
   return kQuantities[static_cast<std::size_t>(quantity)];
 }
 
-/// The end of a limit's keys, and how much SI one of it is.
-struct KeyUnit {
-  const char* end;
-  double si;
-};
-
-KeyUnit keyUnit(Per unit, bool turns) {
-  switch (unit) {
-    case Per::kOne: return {"", 1.0};
-    case Per::kAngle: return {"_deg", kDegree};
-    case Per::kSecond: return {"_s", 1.0};
-    case Per::kHertz: return {"_hz", 1.0};
-    case Per::kWay: return turns ? KeyUnit{"_deg", kDegree} : KeyUnit{"_m", 1.0};
-    case Per::kAcceleration:
-      return turns ? KeyUnit{"_deg_per_s2", kDegree} : KeyUnit{"_m_per_s2", 1.0};
-  }
-  return {"", 1.0};
-}
-
 /// What a limit may be of.
 std::vector<std::string_view> subjects() {
   std::vector<std::string_view> out;
@@ -42,12 +23,6 @@ std::vector<std::string_view> subjects() {
   for (const char* leg : {"leg_1", "leg_2", "leg_3", "leg_4", "leg_5", "leg_6"})
     out.emplace_back(leg);
   return out;
-}
-
-bool turns(const std::string& of) {
-  for (const Coordinate& c : kCoordinates)
-    if (c.name == of) return c.unit == "rad";
-  return false;
 }
 
 AcceptanceLimit readLimit(Section& s) {
@@ -76,10 +51,10 @@ AcceptanceLimit readLimit(Section& s) {
       if (turns(one) != turns(out.of.front()))
         s.fail("of", "has lengths and angles, want an entry for each");
   }
-  const KeyUnit unit = keyUnit(meaning.unit, !out.of.empty() && turns(out.of.front()));
-  const std::string least = std::string("least") + unit.end, most = std::string("most") + unit.end;
-  if (s.has(least)) out.least = s.number(least, -1e9, 1e9) * unit.si;
-  if (s.has(most)) out.most = s.number(most, -1e9, 1e9) * unit.si;
+  const Unit unit = unitOf(out.quantity, !out.of.empty() && turns(out.of.front()));
+  const std::string least = std::string("least") + unit.key, most = std::string("most") + unit.key;
+  if (s.has(least)) out.least = s.number(least, -1e9, 1e9) * unit.key_si;
+  if (s.has(most)) out.most = s.number(most, -1e9, 1e9) * unit.key_si;
   if (!s.has(least) && !s.has(most))
     s.fail(most, fmt::format("is missing, want {}, {}, or both", least, most));
   if (!(out.least <= out.most)) s.fail(most, fmt::format("is below {}, want it above", least));
@@ -91,11 +66,11 @@ AcceptanceLimit readLimit(Section& s) {
 
   out.text = quantity;
   if (!out.of.empty()) out.text += fmt::format(" of {}", fmt::join(out.of, ", "));
-  const std::string shown_unit = meaning.unit == Per::kOne ? "" : " " + std::string(unit.end + 1);
+  const std::string shown_unit = meaning.unit == Per::kOne ? "" : " " + std::string(unit.key + 1);
   if (std::isfinite(out.least))
-    out.text += fmt::format(", at least {:g}{}", out.least / unit.si, shown_unit);
+    out.text += fmt::format(", at least {:g}{}", out.least / unit.key_si, shown_unit);
   if (std::isfinite(out.most))
-    out.text += fmt::format(", at most {:g}{}", out.most / unit.si, shown_unit);
+    out.text += fmt::format(", at most {:g}{}", out.most / unit.key_si, shown_unit);
   if (out.from > 0.0) out.text += fmt::format(", from {:g} Hz", out.from);
   if (std::isfinite(out.up_to)) out.text += fmt::format(", up to {:g} Hz", out.up_to);
   return out;

@@ -20,12 +20,15 @@ struct Moment {
   double told_at = 0.0, read_at = 0.0, felt_at = 0.0;  // [s] by the machine's clock
   Vec6 told, done;                                     // [m, rad] from home
   Vec6 legs, lengths;                                  // [m] told, done
-  Vec6 felt;  // [m/s^2, rad/s^2] acceleration of P in I, by what the load weighs more
+  Vec6 felt =
+      Vec6::Zero();  // [m/s^2, rad/s^2] acceleration of P in I, by what the load weighs more
+  JointVector q = JointVector::Zero();  // [rad | m]
 };
 
 /// [m/s^2, rad/s^2] at which the load on the sensor moves, if it is what the controller believes.
 class Accelerometer {
  public:
+  /// The joints at q, as the machine says.
   Accelerometer(const ControllerConfig& c, const JointVector& q)
       : geometry_(c.geometry),
         load_P_(combine(RigidBody{}, c.payload.X_PL0(), compositeBody(carried(c.payload), q))) {}
@@ -44,9 +47,8 @@ class Accelerometer {
 
 std::vector<Moment> momentsOf(const Series& series) {
   const ControllerConfig& c = series.experiment.controller;
-  const Accelerometer accelerometer(c, series.experiment.plant.task.initial_joints);
-  const double late =
-      M_SQRT2 / c.servo.sensor_cutoff + 0.5 * c.servo.sensor_window + c.servo.sensor_delay;
+  std::optional<Accelerometer> accelerometer;     // from the first sample on
+  const double late = wrenchDelay(c.servo, 0.0);  // each reading has its own time: none is held
   const auto seconds = [](std::int64_t time) {
     return static_cast<double>(time) * kSecondPerNanosecond;
   };
@@ -58,6 +60,8 @@ std::vector<Moment> momentsOf(const Series& series) {
     if (row.has_sample)
       if (const auto sample = fromMessage(row.sample)) {
         m.usable = true;
+        m.q = sample->q;
+        if (!accelerometer) accelerometer.emplace(c, m.q);
         m.read_at = seconds(sample->legs_time);
         m.felt_at = seconds(sample->wrench_time) - late;
       }
@@ -65,7 +69,7 @@ std::vector<Moment> momentsOf(const Series& series) {
     m.done = Vec6::Map(row.state.x_measured);
     m.legs = legLengths(c.geometry, c.geometry.fromHome({m.told.head<3>(), m.told.tail<3>()}));
     m.lengths = Vec6::Map(row.state.leg_measured);
-    m.felt = accelerometer.at(row.state);
+    if (accelerometer) m.felt = accelerometer->at(row.state);
   }
   return out;
 }
@@ -80,6 +84,7 @@ class Test {
 
   CoordinateResult run() {
     for (const std::string& one : test_.skipped) missing(one);
+    standing();
     rest();
     for (const AcceptanceTest::Sine& one : test_.sines) sine(one);
     if (!test_.sines.empty()) corner();
@@ -89,8 +94,7 @@ class Test {
   }
 
  private:
-  using Value = double (*)(const Moment&, int);
-  bool loaded() const { return test_.hardest > 0.0; }
+  bool loaded() const { return stands_ && test_.hardest > 0.0; }
 
   /// Rows of a segment from `skip` to `until` seconds after it began; empty where it was not
   /// reached.
@@ -140,6 +144,18 @@ class Test {
     out_.missing.push_back(fmt::format("{}: {}", coordinate(i_).name, what));
   }
 
+  /// Accelerations are of a load that does not change.
+  void standing() {
+    const double most = series_.experiment.controller.stillness.joint;  // as for a calibration
+    const Moment* first = nullptr;
+    for (const Moment& m : moments_) {
+      if (!m.usable) continue;
+      if (!first) first = &m;
+      stands_ = stands_ && (m.q - first->q).cwiseAbs().maxCoeff() <= most;
+    }
+    if (!stands_) missing("accelerations: the robot moved, want it to stand still");
+  }
+
   void rest() {
     constexpr double kSettles = 1.0;
     const auto rows = of(test_.rest_segment, kSettles);
@@ -148,7 +164,7 @@ class Test {
     put(Quantity::kRestPosition, scatter(done(rows, i_)));
     if (loaded())
       put(Quantity::kRestAcceleration, scatter(felt(rows, i_)));
-    else
+    else if (stands_)
       missing("accelerations: nothing heavy is on the force sensor");
     if (i_ == 2)
       for (int leg = 0; leg < kLegs; ++leg)
@@ -342,26 +358,30 @@ class Test {
   const AcceptanceTest& test_;
   std::vector<Moment> moments_;
   int i_;
+  bool stands_ = true;  // the robot, all through the run
   CoordinateResult out_;
 };
 
-bool turning(const Measurement& f) {
+}  // namespace
+
+bool turns(std::string_view of) {
   for (const Coordinate& c : kCoordinates)
-    if (c.name == f.of) return c.unit == "rad";
+    if (c.name == of) return c.unit == "rad";
   return false;
 }
 
-}  // namespace
-
-Unit unitOf(const Measurement& f) {
-  const bool turns = turning(f);
-  switch (kQuantities[static_cast<std::size_t>(f.quantity)].unit) {
-    case Per::kOne: return {};
-    case Per::kAngle: return {"deg", 1.0 / kDegree};
-    case Per::kSecond: return {"ms", 1e3};
-    case Per::kHertz: return {"Hz", 1.0};
-    case Per::kWay: return turns ? Unit{"deg", 1.0 / kDegree} : Unit{"mm", 1e3};
-    case Per::kAcceleration: return turns ? Unit{"deg/s^2", 1.0 / kDegree} : Unit{"m/s^2", 1.0};
+Unit unitOf(Quantity quantity, bool turns) {
+  constexpr double kShown = 1.0 / kDegree;
+  switch (kQuantities[static_cast<std::size_t>(quantity)].unit) {
+    case Per::kOne: return {"", 1.0, "1", "", 1.0};
+    case Per::kAngle: return {"deg", kShown, "rad", "_deg", kDegree};
+    case Per::kSecond: return {"ms", 1e3, "s", "_s", 1.0};
+    case Per::kHertz: return {"Hz", 1.0, "Hz", "_hz", 1.0};
+    case Per::kWay:
+      return turns ? Unit{"deg", kShown, "rad", "_deg", kDegree} : Unit{"mm", 1e3, "m", "_m", 1.0};
+    case Per::kAcceleration:
+      return turns ? Unit{"deg/s^2", kShown, "rad/s^2", "_deg_per_s2", kDegree}
+                   : Unit{"m/s^2", 1.0, "m/s^2", "_m_per_s2", 1.0};
   }
   return {};
 }

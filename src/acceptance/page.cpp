@@ -107,12 +107,11 @@ void coordinateSection(Page& page, const AcceptanceTest& test, const CoordinateR
                       false});
   if (!found.step_felt.t.empty()) {
     const double per = test.coordinate < 3 ? 1.0 : c.shown;
-    panels.push_back(
-        {"since the step [ms]",
-         test.coordinate < 3 ? "acceleration [m/s^2]" : "acceleration [deg/s^2]",
-         {scaled("told", test.coordinate < 0 ? Track{} : found.step_told, 1e3, per, 1, true),
-          scaled("felt", found.step_felt, 1e3, per, 0)},
-         false});
+    panels.push_back({"since the step [ms]",
+                      test.coordinate < 3 ? "acceleration [m/s^2]" : "acceleration [deg/s^2]",
+                      {scaled("told", found.step_told, 1e3, per, 1, true),
+                       scaled("felt", found.step_felt, 1e3, per, 0)},
+                      false});
   }
   if (!panels.empty())
     page.figure(
@@ -180,7 +179,7 @@ Table verdictTable(const std::vector<AcceptanceVerdict>& verdicts) {
     std::string worst = "-", where = "-";
     if (v.worst) {
       const Measurement& f = *v.worst;
-      worst = shown(f) + (unitOf(f).name.empty() ? "" : " " + unitOf(f).name);
+      worst = shown(f) + (*unitOf(f).name ? std::string(" ") + unitOf(f).name : "");
       where = f.of;
       if (std::isfinite(f.frequency))
         where +=
@@ -196,15 +195,8 @@ std::string acceptanceCsv(const std::vector<CoordinateResult>& found) {
   const auto number = [](double x) { return std::isfinite(x) ? fmt::format("{:.9g}", x) : ""; };
   for (const CoordinateResult& one : found)
     for (const Measurement& f : one.all) {
-      const Unit shown_unit = unitOf(f);
-      const std::string unit = shown_unit.name == "deg"       ? "rad"
-                               : shown_unit.name == "deg/s^2" ? "rad/s^2"
-                               : shown_unit.name == "mm"      ? "m"
-                               : shown_unit.name == "ms"      ? "s"
-                               : shown_unit.name.empty()      ? "1"
-                                                              : shown_unit.name;
       out += fmt::format("{},{},{},{},{},{},{},{}\r\n", f.of,
-                         kQuantities[static_cast<std::size_t>(f.quantity)].name, unit,
+                         kQuantities[static_cast<std::size_t>(f.quantity)].name, unitOf(f).si,
                          number(f.estimate.value), number(f.estimate.within), number(f.frequency),
                          number(f.amplitude), csvField(f.note));
     }

@@ -9,6 +9,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "ves/acceptance/measures.hpp"
@@ -124,12 +125,20 @@ struct Measurement {
   std::string note;        // "worst: beta"
 };
 
-/// The unit of numbers in tables, "" where they have none; and how many of it one of SI is.
+/// A quantity's unit: in tables, "" where it has none, and how many of it one of SI is; in the CSV;
+/// at the end of a limit's keys, and how much SI one of that is.
 struct Unit {
-  std::string name;
+  const char* name = "";
   double per_si = 1.0;
+  const char* si = "1";
+  const char* key = "";
+  double key_si = 1.0;
 };
-Unit unitOf(const Measurement& finding);
+/// Of a rotation or not.
+Unit unitOf(Quantity quantity, bool turns);
+/// Whether a coordinate's name is that of a rotation; a leg's is not.
+bool turns(std::string_view of);
+inline Unit unitOf(const Measurement& m) { return unitOf(m.quantity, turns(m.of)); }
 
 /// What a coordinate's run shows.
 struct CoordinateResult {
