@@ -111,7 +111,7 @@ int masses(const std::string& log, const std::string& scenario, const std::strin
 /// The servos from any log in which every leg moves both ways.
 int servo(const std::string& log, const std::string& scenario, const std::string& file) {
   const Series series = seriesOf(log, scenario);
-  const IdentifiedServo all = orRefuse(log, [&] { return identifiedServo(series, series); });
+  const IdentifiedServo all = orRefuse(log, [&] { return identifiedServo(series); });
   const ServoEstimate& found = all.legs;
   const bool open = !found.servo.opening.isZero(0.0);
   fmt::print("{:>3}{:>22}{:>22}{:>20}{:>20}{}{:>12}\n", "leg", "extending [1/s]",

@@ -373,6 +373,10 @@ TEST(ServoModel, OfAnOpenValveIsWhatItsOrificesPass) {
                   0.01 * up)
           << open << " " << E;
     }
+    double most = 0.0;
+    for (double E = -2e-3; E < 2e-3; E += 1e-5)
+      most = std::max(most, (speedOf(servo, 2, E + 1e-6) - speedOf(servo, 2, E)) / 1e-6);
+    EXPECT_NEAR(steepest(servo)(2), most, 1e-6 * most) << open;
     EXPECT_EQ(speedOf(servo, 2, 0.0), 0.0);
     EXPECT_EQ(differenceOf(servo, 2, 0.0), 0.0);
   }

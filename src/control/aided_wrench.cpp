@@ -81,8 +81,7 @@ AidedWrench::AidedWrench(const ControllerConfig& config)
       geometry_(config.geometry),
       period_(config.periodSeconds()),
       rounding_(config.servo.readings.scale.maxCoeff() / std::sqrt(12.0)),
-      speed_of_count_(config.servo.extend.cwiseMax(config.servo.retract)
-                          .cwiseProduct(config.servo.readings.scale)),
+      speed_of_count_(steepest(config.servo).cwiseProduct(config.servo.readings.scale)),
       joint_speed_(JointParabola(config).speed * config.joints.deviation),
       X_SP_(inverse(config.sensor.X_PS)),
       S_proc_(inverse(config.sensor.C_proc)),

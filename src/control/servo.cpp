@@ -33,6 +33,11 @@ double differenceOf(const ServoModel& servo, int i, double v_end) noexcept {
       v_end);
 }
 
+Vec6 steepest(const ServoModel& servo) noexcept {
+  return (servo.opening.array() > 0.0)
+      .select(servo.extend + servo.retract, servo.extend.cwiseMax(servo.retract));
+}
+
 bool nearNull(const ServoModel& servo, int i, double E) noexcept {
   const double K = E > 0.0 ? servo.extend(i) : servo.retract(i);
   return servo.opening(i) > 0.0 &&

@@ -107,14 +107,16 @@ std::optional<MassRecord> learntMasses(const Series& series) {
   return out;
 }
 
-IdentifiedServo identifiedServo(const Series& moves, const Series& shakes) {
-  const ControllerConfig& c = shakes.experiment.controller;
-  const MotionRecord record = longestMotion(shakes);
+ServoEstimate identifiedLegs(const Series& series) {
+  const ControllerConfig& c = series.experiment.controller;
+  return identifyServo(c.servo, c.periodSeconds(), longestMotion(series).legs);
+}
+
+IdentifiedServo identifiedServo(const Series& series, const std::optional<ServoEstimate>& legs) {
+  const ControllerConfig& c = series.experiment.controller;
+  const MotionRecord record = longestMotion(series);
   IdentifiedServo out;
-  out.legs = identifyServo(c.servo, c.periodSeconds(), longestMotion(moves).legs);
-  // Slow moves tell how far valves are open at null; the gains where they are not, fast ones.
-  if (out.legs.servo.opening.isZero(0.0))
-    out.legs = identifyServo(c.servo, c.periodSeconds(), record.legs);
+  out.legs = legs ? *legs : identifyServo(c.servo, c.periodSeconds(), record.legs);
   out.record = {std::time(nullptr), out.legs.servo, out.legs.deviation};
   try {
     ControllerConfig known = c;

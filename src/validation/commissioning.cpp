@@ -207,7 +207,11 @@ Commissioned commissioned(const Series& series, const Commissioning& commissioni
     out.no_masses = commissioning.no_plan;
   }
   try {
-    out.servo = identifiedServo(movesIn(series), shakesIn(series, out));
+    // Slow moves tell how far valves are open at null; the gains where they are not, fast ones.
+    const ServoEstimate legs = identifiedLegs(movesIn(series));
+    out.servo =
+        identifiedServo(shakesIn(series, out),
+                        legs.servo.opening.isZero(0.0) ? std::optional<ServoEstimate>() : legs);
   } catch (const std::domain_error& why) {
     out.no_servo = why.what();
   }

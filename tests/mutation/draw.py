@@ -141,9 +141,9 @@ class Finder:
     def early_return(self, function):
         body = [c for c in function.get_children() if c.kind == K.COMPOUND_STMT]
         statements = list(body[0].get_children()) if body else []
-        for k, one in enumerate(statements[1:], start=1):
-            a, b = span(one)
-            if one.kind != K.DECL_STMT and a < b and k == len(statements) - 1:
+        if len(statements) > 1 and statements[-1].kind != K.DECL_STMT:
+            a, b = span(statements[-1])
+            if a < b:
                 self.add(a, a, "early return", "if (::ves_m(@)) return; ")
 
     def visit(self, cursor, parent):
@@ -336,8 +336,8 @@ def find_all(modules):
 def draw(found, count, seed):
     """So many mutants in all, by the modules' shares; never two at exactly one place.
 
-    The random ones of an operator are as many as any other's: there are a hundred exchanged fields
-    for an early return.
+    Each kind of error is drawn as often as any other: places for an exchanged field are many, those
+    for an early return are few.
 
     A mutant's lot depends on its own line alone: an edit elsewhere does not draw anew.
     """

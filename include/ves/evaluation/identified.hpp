@@ -39,9 +39,11 @@ struct IdentifiedServo {
   ServoRecord record;
 };
 
-/// The legs from the longest stretch of `moves` under command without a gap, which moves every leg
-/// both ways, or of `shakes` where no valve is found open; the sensor from `shakes`, during which
-/// the robot stands still. Throws std::domain_error where they do not tell.
-IdentifiedServo identifiedServo(const Series& moves, const Series& shakes);
+/// From the longest stretch under command without a gap, which moves every leg both ways. Throws
+/// std::domain_error where it does not tell.
+ServoEstimate identifiedLegs(const Series& series);
+/// The legs too, unless they are known; the sensor, which tells while the robot stands still.
+IdentifiedServo identifiedServo(const Series& series,
+                                const std::optional<ServoEstimate>& legs = {});
 
 }  // namespace ves
