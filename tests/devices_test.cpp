@@ -872,7 +872,6 @@ class ComposedRun : public test::Programs {
                                           kShortProgram,
                                           "--out",
                                           (folder_ / "run").string()};
-    arguments.insert(arguments.end(), patience().begin(), patience().end());
     for (const std::string& set : sets) arguments.insert(arguments.end(), {"--set", set});
     Process run = start("run", arguments);
     EXPECT_EQ(run.wait(), 0);

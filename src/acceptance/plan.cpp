@@ -70,7 +70,6 @@ std::vector<double> stepPath(double acceleration, double period) {
 AcceptanceTest acceptanceTest(const Experiment& scenario, int coordinate,
                               const AcceptanceOptions& options) {
   constexpr double kFarther = 3.0, kMostAngle = 85.0 * kDegree;
-  constexpr double kTake = 0.015;     // [s] in which legs take up the speed that a sine begins with
   constexpr double kLeastLoad = 1.0;  // [kg] below which no acceleration is felt
   const ControllerConfig& c = scenario.controller;
   const Coordinate& names = ves::coordinate(coordinate);
@@ -112,7 +111,7 @@ AcceptanceTest acceptanceTest(const Experiment& scenario, int coordinate,
     for (const double f : options.sines ? options.frequencies : std::vector<double>()) {
       const double w = 2.0 * M_PI * f;
       double most = std::min(way, out.fastest / w);
-      if (loaded) most = std::min({most, room / (w * w), room * kTake / w});
+      if (loaded) most = std::min(most, sineRoom(room, w));
       const double settles = wholeCycles(f, 1.0, kSettles),
                    looks = wholeCycles(f, f < 0.5 ? 3.0 : 4.0, 2.0),
                    amplitude = level * options.share * most,

@@ -43,6 +43,11 @@ double accelerationRoom(const ControllerConfig& c, const JointVector& q, int coo
   return most;
 }
 
+double sineRoom(double acceleration, double w) {
+  constexpr double kTake = 0.015;  // [s]
+  return std::min(acceleration * kTake / w, acceleration / (w * w));
+}
+
 std::string programOf(const PosePlan& plan, const Experiment& experiment) {
   std::string program;
   for (const PosePlan::Attitude& a : plan.attitudes) {

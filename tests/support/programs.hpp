@@ -70,7 +70,7 @@ class Programs : public testing::Test {
   }
   /// A program that runs beside the test.
   static Process start(const std::string& name, std::vector<std::string> arguments) {
-    if (name == "controller")
+    if (name == "controller" || name == "run")
       arguments.insert(arguments.end(), patience().begin(), patience().end());
     arguments.insert(arguments.begin(), name);
     return {std::string(VES_TEST_APP_DIR) + "/ves", arguments};

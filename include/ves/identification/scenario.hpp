@@ -14,6 +14,9 @@ StaticSetup staticSetup(const ControllerConfig& controller);
 /// weight, level and the robot at q, with two fifths of its range to spare; infinite where nothing
 /// is on it.
 double accelerationRoom(const ControllerConfig& controller, const JointVector& q, int coordinate);
+/// [m | rad] of a sine of w [rad/s] that keeps within `acceleration`. It begins with its full speed,
+/// which legs take up within 15 ms.
+double sineRoom(double acceleration, double w);
 
 /// A fifth-order motion of all joints at once.
 struct TimedMove {
