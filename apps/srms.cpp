@@ -15,7 +15,7 @@ namespace {
 
 int showModes(const std::string& name, const std::vector<std::string>& overrides) {
   const Base base = loadBase(findBase(name, configFolder()), overrides);
-  const ModalModel& m = base.modes;
+  const ModalModel m = linearised(base.vehicle);
   fmt::print("{:>4} {:>10} {:>8} {:>12}  {}\n", "mode", "[Hz]", "zeta", "mass [kg]",
              "shape at the robot's foot, in P: x y z [m], alpha beta gamma [rad]");
   for (Eigen::Index i = 0; i < m.stiffness.size(); ++i) {
@@ -74,12 +74,13 @@ int simulateBoth(const std::string& scenario, const std::vector<std::string>& ov
   const Interaction interaction = interactionOf(e, options.duration);
   // The integrator is explicit: it follows every vibration, kept or not by damping.
   constexpr double kFastest = 1000.0;  // [Hz]
-  const double fastest = std::sqrt(interaction.base.stiffness.maxCoeff()) / (2.0 * M_PI);
+  const ModalModel base = linearised(interaction.vehicle);
+  const double fastest = std::sqrt(base.stiffness.maxCoeff()) / (2.0 * M_PI);
   if (!(fastest <= kFastest))
     throw InputError(
         fmt::format("{}: base.keep_modes: the stiffest of the {} modes has {:.0f} Hz; "
                     "keep those up to {:.0f} Hz",
-                    e.name, interaction.base.stiffness.size(), fastest, kFastest));
+                    e.name, base.stiffness.size(), fastest, kFastest));
   std::ofstream to;
   if (!file.empty()) {
     to.open(file);
@@ -103,7 +104,7 @@ int simulateBoth(const std::string& scenario, const std::vector<std::string>& ov
     csv += fmt::format("{:.6f},{},{}\n", split[i].t, fmt::join(split[i].x, ","),
                        fmt::join(whole[i].x, ","));
   }
-  fmt::print("{}: {} modes, {:g} s in free space\n", e.name, interaction.base.stiffness.size(),
+  fmt::print("{}: {} modes, {:g} s in free space\n", e.name, base.stiffness.size(),
              static_cast<double>(options.duration) * kSecondPerNanosecond);
   fmt::print("  {:<8}{:>20}{:>20}{:>20}\n", "", "split, peak to peak", "whole, peak to peak",
              "largest difference");

@@ -315,7 +315,7 @@ PYBIND11_MODULE(_core, m) {
   m.def("composite_body", &compositeBodyOf);
   m.def("gravity_wrench", &gravityWrenchOf);
   m.def("load_base", [](const std::string& name, const Path& config, const Strings& set) {
-    return loadBase(findBase(name, config), set).modes;
+    return linearised(loadBase(findBase(name, config), set).vehicle);
   });
   m.def("modes", &modesOf);
   m.def("admittance_step", &admittanceStep);

@@ -105,7 +105,7 @@ TEST(AppendixE, MassRatiosAreThoseOfPhysicalSpace) {  // (E.18) against (E.20)
   M.diagonal() << 500, 500, 500, 250, 250, 250;
   VectorXd expected = eigenvalues(inverse(M) * spatialMass(robot)).real();
   std::sort(expected.begin(), expected.end(), std::greater<>());
-  EXPECT_LT((massRatios(e.controller.admittance, robot) - expected).norm(), 1e-12);
+  EXPECT_LT((massRatios(linearised(e.controller.vehicle), robot) - expected).norm(), 1e-12);
 }
 
 // --- The machine's loop --------------------------------------------------------------------------
@@ -168,7 +168,7 @@ TEST(LoopModel, GrowsAsTheWholeSimulationDoes) {
     program.size = 4;
     e.plant.task.robot_events.clear();
 
-    const ModalModel& base = e.controller.admittance;
+    const ModalModel base = linearised(e.controller.vehicle);
     const MatrixXd to_modes = leastSquares(base.Phi, MatrixXd::Identity(6, 6));
     const double T = static_cast<double>(e.controller.period) * 1e-9;
     std::vector<double> log_size;  // of the base's energy, half

@@ -112,10 +112,7 @@ Motion freeSpace(const Experiment& e, const Series& series) {
   InteractionOptions options;
   options.model = InteractionModel::kWhole;
   options.duration = duration;
-  const Vec6 start = commanded(series).x.front();
-  options.eta = leastSquares(interaction.base.Phi, start);
-  options.eta_dot = VectorXd::Zero(options.eta.size());
-  interaction.rest = start - interaction.base.Phi * options.eta;
+  interaction.start = commanded(series).x.front();
   return motion(simulate(interaction, options));
 }
 
@@ -457,7 +454,7 @@ TEST_F(Emulation, AFloatingBaseStaysWhereItsMomentumPutsIt) {
                          1.0 + 2.4 * k, joint + 1, to(random));
   }
   const Experiment e = experiment(
-      "puma_on_satellite",
+      "satellite_puma",
       {"program=[{move: {}}, {calibration: {}}, {admittance: {duration_s: 120}, robot: [" + moves +
        "]}]"});
   const Series series = run(e);

@@ -223,7 +223,8 @@ TEST(Config, APlantMismatchChangesTheMachineAndNotWhatTheControllerBelieves) {
 
 TEST(Config, AnotherBaseReplacesTheMachinesOwn) {
   const auto base = [](const std::string& value) {
-    return loadExperiment(scenarios() / "free_decay.yaml", {"base=" + value}).controller.admittance;
+    return linearised(
+        loadExperiment(scenarios() / "free_decay.yaml", {"base=" + value}).controller.vehicle);
   };
   const ModalModel modes = base(
       "{modes: {frequency_hz: [0.5, 1], damping_ratio: [0.02, 0.02], generalized_mass: [1, 1], "
@@ -344,6 +345,23 @@ INSTANTIATE_TEST_SUITE_P(
             "positive semidefinite"},
         Bad{"choice", "z_sine", "legs.filters=all",
             "legs.filters: 'all', want one of none, outputs"},
+        Bad{"body_without_mass", "z_sine",
+            "base=!replace {free: {mass_kg: 0, inertia_kg_m2: [1, 1, 1, 0, 0, 0]}}",
+            "base.free.mass_kg: no mass, want more than 0"},
+        Bad{"body_without_inertia", "z_sine",
+            "base=!replace {free: {mass_kg: 5, inertia_kg_m2: [1, 1, 0, 0, 0, 0]}}",
+            "base.free.inertia_kg_m2: principal moments of 0, 1 and 1 kg m^2 about the centre of "
+            "mass: want all above 0"},
+        Bad{"body_of_no_shape", "z_sine",
+            "base=!replace {free: {mass_kg: 5, inertia_kg_m2: [1, 1, 3, 0, 0, 0]}}",
+            "no body's, want none above the sum of the others"},
+        Bad{"inertia_less_than_its_mass_has", "z_sine",
+            "base=!replace {free: {mass_kg: 5, center_m: [0, 0, 1], inertia_kg_m2: [4, 6, 2, 0, 0, "
+            "0], inertia_about_m: [0, 0, 0]}}",
+            "base.free.inertia_kg_m2: principal moments of -1, 1 and 2 kg m^2"},
+        Bad{"modes_of_a_body", "z_sine",
+            "base=!replace {free: {mass_kg: 5, inertia_kg_m2: [1, 1, 1, 0, 0, 0]}, keep_modes: 2}",
+            "base.keep_modes"},
         Bad{"inertia_without_observer", "z_sine", "controller.compensation.inertia=true",
             "controller.compensation.inertia: needs the observer, want 'observer: true'"},
         Bad{"adaptation_without_observer", "z_sine", "controller.compensation.adaptation=true",

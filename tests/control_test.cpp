@@ -253,7 +253,7 @@ TEST(AdmittanceModel, IsWhereItIsResetBeforeItsFirstStep) {
   const ControllerConfig c = experiment("puma_on_table_4_1").controller;
   const Vec6 x = Vec6::LinSpaced(-0.03, 0.02);
   for (const double ahead : {0.0, 0.02}) {
-    AdmittanceModel model(c.admittance, kT);
+    AdmittanceModel model(c.vehicle, kT);
     model.step(Wrench::from(Vec6::Constant(10.0)));
     model.reset(x, Mat6::Zero(), ahead);
     EXPECT_EQ(model.motion().x, x);
@@ -263,7 +263,7 @@ TEST(AdmittanceModel, IsWhereItIsResetBeforeItsFirstStep) {
 
 TEST(AdmittanceModel, ASlowedStepGoesThatShareOfTheWay) {
   const ControllerConfig c = experiment("puma_on_table_4_1").controller;
-  AdmittanceModel model(c.admittance, kT);
+  AdmittanceModel model(c.vehicle, kT);
   model.reset(Vec6::LinSpaced(-0.02, 0.03));
   for (int n = 0; n < 40; ++n) model.step(Wrench::from(Vec6::LinSpaced(30.0, -20.0)));
   const PathPoint<6> before = model.motion();

@@ -255,7 +255,8 @@ Books books(const Experiment& e) {
   const Mat6 M_1 =
       spatialMass(combine(RigidBody{}, e.plant.payload.X_PL0(),
                           compositeBody(carried(e.plant.payload), e.plant.task.initial_joints)));
-  const Eigen::MatrixXd inverse = leastSquares(e.controller.admittance.Phi, Mat6::Identity());
+  const Eigen::MatrixXd inverse =
+      leastSquares(linearised(e.controller.vehicle).Phi, Mat6::Identity());
   Lockstep machine(e.controller, e.plant);
   machine.step({Request::kStart, {}, {}});
   Books out;

@@ -121,7 +121,7 @@ TEST(Gate, LooksAtEveryPoseOfTheRobot) {
   const auto stable = [](double lighter, const std::string& robot) {
     Experiment e = test::experiment("doss_on_table_4_1",
                                     {"program=[{admittance: {duration_s: 5}" + robot + "}]"});
-    e.controller.admittance.Phi *= lighter;
+    std::get<ModalModel>(e.controller.vehicle).Phi *= lighter;
     return isStable(e.controller, e.plant.task);
   };
   double lo = 1.0, hi = 100.0;
@@ -342,7 +342,8 @@ TEST(LoopModel, BasesKeepTheModesThatTheRuleGives) {
       for (const char* filters : {"none", "outputs"}) {
         const std::string name = std::string("srms_") + configuration + "_" + robot;
         const auto set = std::string("legs.filters=") + filters;
-        kept = static_cast<int>(test::experiment(name).controller.admittance.stiffness.size());
+        kept = static_cast<int>(
+            linearised(test::experiment(name).controller.vehicle).stiffness.size());
         const Experiment e = test::experiment(name, {set, "base.keep_modes=8"});
         stable = std::min(stable, stableModes(e.controller, e.plant.task.initial_joints));
       }

@@ -32,11 +32,12 @@ const std::map<std::string, Names> kMayInclude = [] {
   add("contract", {"robot"}, "kinematics");
   add("realtime", {}, "core");
   add("bus", {"realtime", "core"}, "contract");
-  add("control", {}, "contract");
+  add("vehicle", {}, "contract");
+  add("control", {}, "vehicle");
   add("contact", {}, "robot");
   add("planning", {"core", "contact"}, "contract");
   add("plant", {"planning", "core", "contact"}, "control");
-  add("srms", {"planning", "core", "contact"}, "control");
+  add("srms", {"planning", "core", "contact"}, "vehicle");
   add("analysis", {"planning", "core", "contact"}, "control");  // what judges cannot see the plant
   add("config", {"srms", "analysis"}, "plant");
   add("identification", {}, "config");
@@ -57,7 +58,7 @@ const std::map<std::string, Names> kMayInclude = [] {
   return may;
 }();
 
-const Names kPure = {"math", "kinematics", "robot", "contract", "control"};
+const Names kPure = {"math", "kinematics", "robot", "contract", "vehicle", "control"};
 
 struct Include {
   fs::path file;

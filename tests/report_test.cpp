@@ -26,11 +26,12 @@ Interaction interaction(const std::string& scenario, const std::vector<std::stri
 TEST(CoupledModes, AreTheRootsOfBaseAndRobotTogether) {
   const Interaction i = interaction("srms_capture_doss", {"base.keep_modes=6"});
   const Eigen::MatrixXd A = augmentedModalMass(
-      i.base, combine(RigidBody{}, i.payload.X_PL0(), compositeBody(carried(i.payload), i.q0)));
+      linearised(i.vehicle),
+      combine(RigidBody{}, i.payload.X_PL0(), compositeBody(carried(i.payload), i.q0)));
   Eigen::MatrixXd S = Eigen::MatrixXd::Zero(12, 12);
   S.topRightCorner(6, 6).setIdentity();
-  S.bottomLeftCorner(6, 6) = -solvePositive(A, i.base.stiffness.asDiagonal());
-  S.bottomRightCorner(6, 6) = -solvePositive(A, i.base.damping);
+  S.bottomLeftCorner(6, 6) = -solvePositive(A, linearised(i.vehicle).stiffness.asDiagonal());
+  S.bottomRightCorner(6, 6) = -solvePositive(A, linearised(i.vehicle).damping);
   const Eigen::VectorXcd roots = eigenvalues(S);
   ASSERT_EQ(coupledModes(i).size(), 6u);
   for (const CoupledMode& mode : coupledModes(i)) {
@@ -122,7 +123,7 @@ TEST(VesOnTheArm, IsSrmsRobotLateByTheSensorWhenTheArmHardlyGives) {
                        {"gravity_m_per_s2=0", "sensor.noise=false",
                         "program=[{move: {}}, {calibration: {}}, {admittance: {duration_s: 6}, "
                         "robot: [{at_s: 0, duration_s: 1, joint: joint_3, to_deg_or_m: -20}]}]"});
-  e.controller.admittance.Phi /= 8.0;
+  std::get<ModalModel>(e.controller.vehicle).Phi /= 8.0;
   InteractionOptions options;
   const Interaction i = interactionOf(e, options.duration);
   options.step = 1'000'000;

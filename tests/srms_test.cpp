@@ -155,27 +155,28 @@ TEST(BeamModel, AllModesTogetherAreTheStaticCompliance) {
 
 TEST(Srms, TurningTheShoulderTurnsNothingElse) {
   const std::string file = test::configDir() + "/bases/srms_capture.yaml";
-  const ModalModel a = loadBase(file, {"keep_modes=20"}).modes;
-  const ModalModel b = loadBase(file, {"keep_modes=20", "arm.pose_deg.shoulder_yaw=75"}).modes;
+  const ModalModel a = linearised(loadBase(file, {"keep_modes=20"}).vehicle);
+  const ModalModel b =
+      linearised(loadBase(file, {"keep_modes=20", "arm.pose_deg.shoulder_yaw=75"}).vehicle);
   EXPECT_LT((a.stiffness.cwiseQuotient(b.stiffness).array() - 1.0).abs().maxCoeff(), 1e-6);
   EXPECT_LT((a.Phi - b.Phi).cwiseAbs().maxCoeff(), 1e-5);  // the tip's own axes turn along
 }
 
 TEST(Srms, StiffnessScalesEveryFrequencyAlike) {
   const std::string file = test::configDir() + "/bases/srms_unberth.yaml";
-  const ModalModel one = loadBase(file, {}).modes;
-  const ModalModel half = loadBase(file, {"arm.stiffness_scale=0.5"}).modes;
+  const ModalModel one = linearised(loadBase(file, {}).vehicle);
+  const ModalModel half = linearised(loadBase(file, {"arm.stiffness_scale=0.5"}).vehicle);
   EXPECT_LT((half.stiffness.cwiseQuotient(one.stiffness).array() - 0.5).abs().maxCoeff(), 1e-6);
 }
 
 TEST(Srms, PayloadOfTheModelIsThePayloadPutOnByHand) {
   const std::string file = test::configDir() + "/bases/srms_capture.yaml";
-  const ModalModel bare = loadBase(file, {"keep_modes=132"}).modes;
-  const ModalModel loaded =
+  const ModalModel bare = linearised(loadBase(file, {"keep_modes=132"}).vehicle);
+  const ModalModel loaded = linearised(
       loadBase(file, {"keep_modes=132",
                       "arm.payload={mass_kg: 150, center_m: [0.1, -0.2, 0.6], inertia_kg_m2: [20, "
                       "25, 15, 1, -2, 0.5]}"})
-          .modes;
+          .vehicle);
   RigidBody payload{150, {0.1, -0.2, 0.6}, Mat3::Zero()};
   payload.I_Bcm_B << 20, 1, -2, 1, 25, 0.5, -2, 0.5, 15;
   // In the modes of the bare arm: (3.11) without rates.

@@ -299,7 +299,7 @@ TEST(VehicleOrder, DoublesAndHalvesTheStiffnessInOperation) {
       return s.phase == Phase::kRunning && s.kind == SegmentKind::kAdmittance;
     });
     std::mt19937 dice(7);
-    const ModalModel& base = e.controller.admittance;
+    const ModalModel base = linearised(e.controller.vehicle);
     const Mat6 to_modes = base.Phi.inverse();
     const auto inVehicle = [&](const TickState& s) {  // [J]
       const Vec6 eta = to_modes * s.motion.x, rate = to_modes * s.motion.x_dot;
@@ -345,7 +345,7 @@ TEST(VehicleVerdict, IsTheStabilityChecksOfTheVehicleThatIsMeant) {
   const VehicleFactors light{0.02, 1.0, 1.0}, heavy{2.0, 1.0, 1.0};
   ControllerConfig changed = e.controller;
   changed.compensation = {};
-  changed.admittance = scaled(e.controller.admittance, light);
+  changed.vehicle = scaled(linearised(e.controller.vehicle), light);
   ASSERT_FALSE(isStable(changed, e.plant.task));  // a robot too heavy for it
   const VehicleVerdict down = assessChange(e.controller, e.plant.task, {}, light);
   EXPECT_EQ(down.uncompensated, Stability::kUnstable);
@@ -354,7 +354,7 @@ TEST(VehicleVerdict, IsTheStabilityChecksOfTheVehicleThatIsMeant) {
   EXPECT_EQ(up.compensated, Stability::kStable);
   // Also where only the way leads through what would diverge.
   const VehicleFactors stiff{0.01, 1.0, 100.0};
-  changed.admittance = scaled(e.controller.admittance, stiff);
+  changed.vehicle = scaled(linearised(e.controller.vehicle), stiff);
   ASSERT_TRUE(isStable(changed, e.plant.task));
   EXPECT_EQ(assessChange(e.controller, e.plant.task, {}, stiff).uncompensated,
             Stability::kUnstable);

@@ -197,7 +197,7 @@ bool contactsDecay(const ControllerConfig& controller, const RobotTask& task) {
 
 LoopVerdict assessStability(const ControllerConfig& controller, const RobotTask& task) {
   LoopVerdict out;
-  out.modes = static_cast<int>(controller.admittance.stiffness.size());
+  out.modes = static_cast<int>(linearised(controller.vehicle).stiffness.size());
   out.stable_modes = out.modes;
   const std::vector<CarriedRobot> robots = bodies(controller, task);
   const double growth = allowedGrowth(controller);
@@ -375,9 +375,9 @@ VehicleVerdict assessChange(const ControllerConfig& controller, const RobotTask&
       const auto between = [&](double a, double b) { return a + share * (b - a); };
       ControllerConfig changed = controller;
       changed.compensation = compensation;
-      changed.admittance = scaled(controller.admittance,
-                                  {between(from.mass, to.mass), between(from.damping, to.damping),
-                                   between(from.stiffness, to.stiffness)});
+      changed.vehicle = scaled(linearised(controller.vehicle),
+                               {between(from.mass, to.mass), between(from.damping, to.damping),
+                                between(from.stiffness, to.stiffness)});
       return !isStable(changed, task) || !contactsDecay(changed, task);
     };
     // The end first: it is what is refused most often.

@@ -175,7 +175,7 @@ std::vector<Direction> directionsOf(const ControllerConfig& controller) {
 
 Loop loopOf(const ControllerConfig& controller, const JointVector& q, Direction direction) {
   Loop loop;
-  loop.base = controller.admittance;
+  loop.base = linearised(controller.vehicle);
   loop.robot_P = lockedRobot(controller.payload, q);
   loop.period = static_cast<double>(controller.period) * kSecondPerNanosecond;
   Loop::Model& own = loop.model;
@@ -332,7 +332,7 @@ ModalModel softest(const ModalModel& base, int k) {
 }
 
 int stableModes(const ControllerConfig& controller, const JointVector& q) {
-  const auto all = static_cast<int>(controller.admittance.stiffness.size());
+  const auto all = static_cast<int>(linearised(controller.vehicle).stiffness.size());
   for (int k = 1; k <= all; ++k)
     for (const Direction direction : directionsOf(controller)) {
       Loop loop = loopOf(controller, q, direction);

@@ -181,14 +181,14 @@ Base readMatrices(Section& s) {
   const Mat6 C = readMatrix(s, "damping", true);
   const Mat6 K = readMatrix(s, "stiffness", true);
   Base out;
-  out.modes = keep(modesOf(M, C, K), readKeep(s, 6));
+  out.vehicle = keep(modesOf(M, C, K), readKeep(s, 6));
   return out;
 }
 
 Base readModes(Section& s) {
   const ModalModel all = readTable(s.section("modes"));
   Base out;
-  out.modes = keep(all, readKeep(s, static_cast<int>(all.stiffness.size())));
+  out.vehicle = keep(all, readKeep(s, static_cast<int>(all.stiffness.size())));
   return out;
 }
 
@@ -202,7 +202,7 @@ Base readArmBase(Section& s) {
   if (dofs == 0) section.fail("chain", "has nothing that can move");
   try {
     const std::shared_ptr<const ArmModes> modes = modesOfArm(arm, *out.arm, readKeep(s, dofs));
-    out.modes = modes->tip;
+    out.vehicle = modes->tip;
     out.shape = modes->shape;
   } catch (const std::domain_error&) {
     section.fail("chain",
@@ -212,12 +212,44 @@ Base readArmBase(Section& s) {
   return out;
 }
 
+/// A body that floats.
+Base readFree(Section& s) {
+  FreeBodyModel free;
+  Section section = s.section("free");
+  if (section.has("velocity_m_per_s"))
+    free.v_IPo_I = section.vector("velocity_m_per_s", 3, -1.0, 1.0);
+  if (section.has("rate_deg_per_s"))
+    free.w_IP_I = kDegree * section.vector("rate_deg_per_s", 3, -90.0, 90.0);
+  std::optional<Vec3> about;  // [m] of P
+  if (section.has("inertia_about_m")) about = section.vector("inertia_about_m", 3, -100.0, 100.0);
+  RigidBody& body = free.body_P = readBody(section);
+  if (!(body.mass > 0.0)) section.fail("mass_kg", "no mass, want more than 0");
+  if (about) {
+    const Mat3 S = skew(body.p_BoBcm_B - *about);
+    body.I_Bcm_B += body.mass * S * S;
+  }
+  const Eigen::VectorXd moments = symmetricEigenvalues(body.I_Bcm_B);
+  const auto fail = [&](const std::string& why) {
+    section.fail("inertia_kg_m2",
+                 fmt::format("principal moments of {:.4g}, {:.4g} and {:.4g} kg m^2 about the "
+                             "centre of mass: {}",
+                             moments(0), moments(1), moments(2), why));
+  };
+  if (!(moments(0) > 1e-9 * moments(2))) fail("want all above 0");
+  if (!(moments(2) <= (1.0 + 1e-9) * (moments(0) + moments(1))))
+    fail("no body's, want none above the sum of the others");
+  Base out;
+  out.vehicle = free;
+  return out;
+}
+
 /// A kind of base, by the key that says so.
 struct BaseKind {
   std::string_view key;
   Base (*read)(Section& s);
 };
 constexpr BaseKind kBases[] = {{"arm", readArmBase},
+                               {"free", readFree},
                                {"modes", readModes},
                                {"mass", readMatrices},
                                {"mass_diagonal", readMatrices}};

@@ -159,10 +159,10 @@ Experiment build(const Value& document, AskedKey* asked = nullptr) {
       readSafety(root.section("safety"), c.geometry, use, legs, sensor.model.volts_per_count);
   c.safety.alone = static_cast<double>(p.watchdog.park_after) * kSecondPerNanosecond;
   const Base base = readBase(root.section("base"));
-  c.admittance = base.modes;
-  if (c.compensation.inertia && c.admittance.stiffness.size() > 0) {
-    const double fastest = std::sqrt(c.admittance.stiffness.maxCoeff()),
-                 damping = c.admittance.damping.norm();
+  c.vehicle = base.vehicle;
+  if (const ModalModel modes = linearised(c.vehicle);
+      c.compensation.inertia && modes.stiffness.size() > 0) {
+    const double fastest = std::sqrt(modes.stiffness.maxCoeff()), damping = modes.damping.norm();
     if (!((fastest + damping) * c.periodSeconds() <= kMostModalAngle))
       root.fail(
           "base",
@@ -395,7 +395,7 @@ Interaction interactionOf(const Experiment& experiment, std::int64_t& duration) 
         fmt::format("{}: no admittance segment, want one in its program", experiment.name));
   duration = std::llround(program.segments[static_cast<std::size_t>(segment)].duration * 1e9);
   Interaction out;
-  out.base = experiment.controller.admittance;
+  out.vehicle = experiment.controller.vehicle;
   out.payload = experiment.plant.payload;
   out.world = experiment.plant.task.world;
   out.p_IH = experiment.plant.geometry.home();

@@ -8,7 +8,7 @@
 namespace ves {
 
 AdmittanceControl::AdmittanceControl(const ControllerConfig& config)
-    : model_(config.admittance, config.periodSeconds()),
+    : model_(config.vehicle, config.periodSeconds()),
       hindsight_(config.periodSeconds()),
       inertia_(config.compensation.inertia),
       aided_(config.compensation.aided),
@@ -52,12 +52,11 @@ const PathPoint<6>& AdmittanceControl::step(const AdmittanceInput& in, const Vec
     change_.advance(model_);
     const double damping = energy_.damping() + change_.damping();
     if (inertia_)
-      model_.step(in.F_Po_I, {in.M_1_before, in.M_1}, since,
-                  in.wrench.age + in.share * wrench_delay_, damping);
+      model_.step(in.F_Po_I, in.body, since, in.wrench.age + in.share * wrench_delay_, damping);
     else
       model_.step(in.F_Po_I, damping);
     if (aided_) {
-      hindsight_.step(model_, in.M_1, since, in.lesson);
+      hindsight_.step(model_, in.body.M_1, since, in.lesson);
       if (hindsight_.any()) model_.displace(hindsight_.due());
     }
     slowInsideEnvelope(last, in.L, checks);

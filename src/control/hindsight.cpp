@@ -35,7 +35,7 @@ void Hindsight::step(const AdmittanceModel& model, const Mat6& M_1, double dt,
     momentum_ = (mass_ * momentum_ + (mass - mass_) * eta_dot_) / mass;
     mass_ = mass;
   }
-  const ModalDynamics::Body body = base.body(M_1 / mass);
+  const ModalDynamics::Body body = model.body(M_1);
   const ModalDynamics::Forces none = ModalDynamics::Forces::Zero(base.size());
   if (lesson.momentum.cols() == eta_.cols() && lesson.hand >= 0) {
     eta_.middleCols<4>(lesson.hand).setZero();

@@ -106,8 +106,13 @@ Wrench RobotInertia::update(const KnownPayload& known, std::int64_t count, const
   known_ = true;
   if (first || since > 0.0) {
     whole_before_ = whole_;
+    R_IP_before_ = R_IP_;
     whole_ = scale_ * spatialMass(rotated(X_IP.R, composite_P_));
-    if (first) whole_before_ = whole_;
+    R_IP_ = X_IP.R;
+    if (first) {
+      whole_before_ = whole_;
+      R_IP_before_ = R_IP_;
+    }
     since_ = since;
   }
   M_1_ = share * whole_;

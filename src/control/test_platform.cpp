@@ -96,7 +96,7 @@ Waypoint<6> TestPlatform::nextMotion(const Wrenches& W) noexcept {
                            ? Mat6(Mat6::Zero())
                            : filter_.noise(wrenchNoise(config_.sensor, bias_.noise(), X_IP.R));
     return motion_.admittanceModel(
-        {W.dynamic, W.felt, noise, robot_.M_1(), robot_.before(), share_.value(), samples_.wrench(),
+        {W.dynamic, W.felt, noise, robot_.carried(), share_.value(), samples_.wrench(),
          aided_.lesson(), sample.q, commander_.legs().L, X_IP, legs_.servo()},
         safety_.path());
   }

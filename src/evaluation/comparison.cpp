@@ -68,16 +68,13 @@ Motion actual(const Series& series) {
 
 std::shared_ptr<const std::optional<Motion>> ReferenceMotions::of(const Interaction& interaction,
                                                                   std::int64_t step,
-                                                                  std::int64_t duration,
-                                                                  const Eigen::VectorXd& eta) {
-  return known_.of({interaction, step, duration, eta}, [&]() -> std::optional<Motion> {
+                                                                  std::int64_t duration) {
+  return known_.of({interaction, step, duration}, [&]() -> std::optional<Motion> {
     ++computed_;
     InteractionOptions options;
     options.model = InteractionModel::kWhole;
     options.step = step;
     options.duration = duration;
-    options.eta = eta;
-    options.eta_dot = Eigen::VectorXd::Zero(eta.size());
     try {
       return motion(simulate(interaction, options));
     } catch (const std::domain_error&) {
@@ -106,8 +103,7 @@ std::optional<Motion> baseMotion(const Experiment& e, const Vec6& start,
   if (!wantsAdmittance(e.controller.program)) return {};
   std::int64_t duration = 0;
   Interaction interaction = interactionOf(e, duration);
-  const Eigen::VectorXd eta = leastSquares(interaction.base.Phi, start);
-  interaction.rest = restOf(interaction.base, start);
+  interaction.start = start;
   if (pushes) {
     std::erase_if(interaction.actions,
                   [](const TimedAction& one) { return std::holds_alternative<Push>(one.action); });
@@ -115,7 +111,7 @@ std::optional<Motion> baseMotion(const Experiment& e, const Vec6& start,
     std::stable_sort(interaction.actions.begin(), interaction.actions.end(),
                      [](const TimedAction& a, const TimedAction& b) { return a.start < b.start; });
   }
-  return *references.of(interaction, e.controller.period, duration, eta);
+  return *references.of(interaction, e.controller.period, duration);
 }
 
 bool ofConfiguredVehicle(const state_t& s) noexcept {
@@ -169,7 +165,7 @@ std::optional<Emulation> emulation(const Series& series, ReferenceMotions& refer
 
 Amplitude amplitude(const Experiment& experiment, const Motion& base) {
   if (base.x.empty()) return {};
-  const Vec6 rest = restOf(experiment.controller.admittance, base.x.front());
+  const Vec6 rest = restOf(linearised(experiment.controller.vehicle), base.x.front());
   Amplitude out;
   for (const Vec6& x : base.x) {
     out.position = std::max(out.position, (x - rest).head<3>().norm());
@@ -268,7 +264,7 @@ Distance travel(const Motion& motion) {
 }
 
 std::vector<CoupledMode> coupledModes(const Interaction& interaction) {
-  const ModalModel& base = interaction.base;
+  const ModalModel base = linearised(interaction.vehicle);
   const RigidBody robot = lockedRobot(interaction.payload, interaction.q0);
   const Eigen::MatrixXd A = augmentedModalMass(base, robot);
   const Eigenmodes modes = eigenmodes(A, base.stiffness.asDiagonal());

@@ -56,7 +56,7 @@ namespace {
 /// [J] of the vehicle with a robot that moves as one body, and of what floats.
 double energy(const Experiment& e, const Vec6& x, const Vec6& x_dot, const JointVector& q,
               const Floating& floating) {
-  const ModalModel& base = e.controller.admittance;
+  const ModalModel base = linearised(e.controller.vehicle);
   const Mat6 M_1 = spatialMass(rotated(rotation(x.tail<3>()), lockedRobot(e.plant.payload, q)));
   const Eigen::VectorXd eta = leastSquares(base.Phi, x), eta_dot = leastSquares(base.Phi, x_dot);
   double twice =

@@ -80,7 +80,7 @@ Scene::Scene(const Experiment& e)
       size_(jointRadius(geometry_) / kJointRadius),
       payload_(e.plant.payload),
       arm_(e.arm.value_or(ArmShape())),
-      Phi_(e.controller.admittance.Phi) {
+      Phi_(linearised(e.controller.vehicle).Phi) {
   if (e.robot.tool()) tool_ = *e.robot.tool();
   description_ = {{"name", e.name},
                   {"description", e.description},

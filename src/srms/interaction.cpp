@@ -8,9 +8,7 @@
 #include <stdexcept>
 
 #include "gsl_errors.hpp"
-#include "ves/kinematics/stewart.hpp"
-#include "ves/math/dense.hpp"
-#include "ves/robot/newton_euler.hpp"
+#include "vehicle_equations.hpp"
 
 namespace ves {
 namespace {
@@ -22,27 +20,31 @@ struct FreeDriver {
   void operator()(gsl_odeiv2_driver* d) const { gsl_odeiv2_driver_free(d); }
 };
 
-/// The equations of motion, y = {eta, eta'}, and where there is a world {p, q, v, w} of what floats
-/// in it.
+/// The equations of motion, y = {the vehicle's, and where there is a world {p, q, v, w} of what
+/// floats in it}.
 class Equations {
+  template <typename F>
+  decltype(auto) each(F&& f) const {
+    return std::visit(f, vehicle_);
+  }
+
  public:
   Equations(const Interaction& interaction, const InteractionOptions& options)
       : interaction_(interaction),
-        base_(interaction.base),
         robot_(carried(interaction.payload), interaction.q0),
         X_PL0_(interaction.payload.X_PL0()),
-        options_(options) {}
+        vehicle_(equationsOf(interaction, options)) {}
 
-  Eigen::Index modes() const { return base_.stiffness.size(); }
   std::size_t size() const {
-    return static_cast<std::size_t>(2 * modes() + (interaction_.world ? kFloating : 0));
+    return static_cast<std::size_t>(ofVehicle() + (interaction_.world ? kFloating : 0));
+  }
+  double milli() const {
+    return each([](const auto& v) { return v.milli(); });
   }
 
   VectorXd start() const {
-    const Eigen::Index k = modes();
-    VectorXd y = VectorXd::Zero(static_cast<Eigen::Index>(size()));
-    if (options_.eta.size()) y.head(k) = options_.eta;
-    if (options_.eta_dot.size()) y.segment(k, k) = options_.eta_dot;
+    VectorXd y(static_cast<Eigen::Index>(size()));
+    y.head(ofVehicle()) = each([&](const auto& v) { return v.start(riding(robot_.at(0))); });
     if (interaction_.world) {
       const std::optional<Target>& target = interaction_.world->environment.target;
       const Floating f = target ? target->start : Floating{};
@@ -54,25 +56,28 @@ class Equations {
   /// The interval that begins now, `step` steps after the start.
   void begin(std::int64_t now, std::int64_t step) {
     now_ = now;
-    if (options_.hold_mass > 0 && step % options_.hold_mass == 0 && step != held_at_) {
-      held_at_ = step;
-      held_ = compositeBody(robot_.model(), robot_.at(now_).q);
-    }
+    std::visit([&](auto& v) { v.begin(riding(robot_.at(now_)), step); }, vehicle_);
   }
-  void begin(const RobotAction& action, const VectorXd& y) {
+  void begin(const RobotAction& action, VectorXd& y) {
     if (const auto* push = std::get_if<Push>(&action)) {
       push_ = BegunPush{*push, now_};
       return;
     }
     if (std::holds_alternative<GraspTarget>(action)) {
       Floating target = floating(y);
+      const JointState q = robot_.at(now_);
       if (interaction_.world &&
-          grasp(interaction_.world->environment, toolMotion(robot_.at(now_), platform(y)), target))
+          grasp(interaction_.world->environment, toolMotion(q, platform(q, y)), target))
         X_TB_ = target.X_TB;
     } else if (std::holds_alternative<Release>(action) && X_TB_) {
       X_TB_.reset();
     } else {
+      const bool loads =
+          std::holds_alternative<Grasp>(action) || std::holds_alternative<Release>(action);
+      const JointState q = robot_.at(now_);
+      const BodyMotion P = platform(q, y);
       robot_.begin(action, now_);
+      if (loads) each([&](const auto& v) { v.load(riding(q), P, y); });
     }
   }
 
@@ -82,52 +87,38 @@ class Equations {
   }
 
   void derivative(double later, const VectorXd& y, VectorXd& dy) const {
-    const Eigen::Index k = modes();
-    const auto eta = y.head(k), eta_dot = y.segment(k, k);
     const JointState q = robot_.at(now_, later);
-    dy.head(k) = eta_dot;
-    VectorXd right = -base_.stiffness.cwiseProduct(eta) - base_.damping * eta_dot;
-    MatrixXd A;
-    if (options_.model == InteractionModel::kSplit)
-      split(q, eta_dot, A, right);
-    else
-      whole(q, y, A, right);
-    Wrench on_target_Bo_I;
+    Wrench F_Po_I, on_target_Bo_I;  // beside the robot's
     if (pushing()) {
-      const BodyMotion P = platform(y);
+      const BodyMotion P = platform(q, y);
       const Push& push = push_->push;
       const Transform X_IB = interaction_.world ? floating(y).X_IB() : Transform();
       const Vec3 at = pushedPoint(push, P.X, X_PL0_, robot_.model(), q.q, X_IB);
       if (push.on == Push::On::kTarget)
         on_target_Bo_I = {push.force_I, (at - X_IB.p).cross(push.force_I)};
       else
-        right += jacobian(y).transpose() *
-                 Wrench{push.force_I, (at - P.X.p).cross(push.force_I)}.stacked();
+        F_Po_I = {push.force_I, (at - P.X.p).cross(push.force_I)};
     }
     if (interaction_.world) {
-      const BodyMotion P = platform(y);
+      const BodyMotion P = platform(q, y);
       const FrameMotion tool = toolMotion(q, P);
       const Touch touched = touch(interaction_.world->environment, tool, floating(y));
-      right += jacobian(y).transpose() * shift(touched.on_tool_To_I, P.X.p - tool.X.p).stacked();
+      F_Po_I = F_Po_I + shift(touched.on_tool_To_I, P.X.p - tool.X.p);
       const FloatingRates f = rates(interaction_.world->environment, floating(y),
                                     touched.on_target_Bo_I + on_target_Bo_I);
       dy.tail<kFloating>() << f.p, f.q, f.v, f.w;
     }
-    dy.segment(k, k) = solvePositive(A, right);
+    each([&](const auto& v) { v.derivative(riding(q), y, F_Po_I, dy); });
   }
 
   InteractionPoint point(std::int64_t now, const VectorXd& y) const {
-    const Eigen::Index k = modes();
     InteractionPoint p;
     p.t = static_cast<double>(now) * kSecondPerNanosecond;
-    p.eta = y.head(k);
-    p.eta_dot = y.segment(k, k);
-    p.x = coordinates(y);
-    p.x_dot = base_.Phi * p.eta_dot;
+    const JointState q = robot_.at(now);
+    each([&](const auto& v) { v.tell(riding(q), y, p); });
     if (interaction_.world) {
       p.target = floating(y);
-      p.touch =
-          touch(interaction_.world->environment, toolMotion(robot_.at(now), platform(y)), p.target);
+      p.touch = touch(interaction_.world->environment, toolMotion(q, platform(q, y)), p.target);
       p.contacts = contacts_;
     }
     return p;
@@ -135,8 +126,8 @@ class Equations {
 
   /// What touches, `later` [s] in the interval.
   Touch touched(double later, const VectorXd& y) const {
-    return touch(interaction_.world->environment, toolMotion(robot_.at(now_, later), platform(y)),
-                 floating(y));
+    const JointState q = robot_.at(now_, later);
+    return touch(interaction_.world->environment, toolMotion(q, platform(q, y)), floating(y));
   }
   const Contact& contact() const { return contacts_.last(); }
   bool hasWorld() const { return interaction_.world.has_value(); }
@@ -146,6 +137,14 @@ class Equations {
 
  private:
   static constexpr int kFloating = 13;
+
+  Eigen::Index ofVehicle() const {
+    return each([](const auto& v) { return v.size(); });
+  }
+  RidingRobot riding(const JointState& q) const { return {robot_.model(), X_PL0_, q}; }
+  BodyMotion platform(const JointState& q, const VectorXd& y) const {
+    return each([&](const auto& v) { return v.platform(riding(q), y); });
+  }
 
   bool pushing() const { return push_ && now_ < push_->end(); }
 
@@ -159,68 +158,16 @@ class Equations {
     out.X_TB = X_TB_;
     return out;
   }
-  /// Where P is, and how it moves.
-  BodyMotion platform(const VectorXd& y) const {
-    const Eigen::Index k = modes();
-    const Vec6 x_dot = base_.Phi * y.segment(k, k);
-    return bodyMotion(interaction_.p_IH, Pose::from(coordinates(y)), x_dot, Vec6::Zero());
-  }
-  Vec6 coordinates(const VectorXd& y) const {
-    return interaction_.rest + base_.Phi * y.head(modes());
-  }
-  /// {v, w} of P per eta'.
-  MatrixXd jacobian(const VectorXd& y) const {
-    MatrixXd J = base_.Phi;
-    J.bottomRows<3>() = angleRateMap(coordinates(y).tail<3>()) * base_.Phi.bottomRows<3>();
-    return J;
-  }
   FrameMotion toolMotion(const JointState& q, const BodyMotion& P) const {
     return carriedFrame(robot_.model(), q, P, X_PL0_, interaction_.world->link,
                         interaction_.world->X_link);
   }
 
-  /// What the base feels of the robot, about Po in P.
-  Wrench reaction(const JointState& q, const ProperMotion& L0) const {
-    return transfer(X_PL0_, Wrench{} - newtonEuler(robot_.model(), q, L0).F_L0o_L0);
-  }
-
-  RigidBody lockedInP(const JointVector& q) const {
-    return combine(RigidBody{}, X_PL0_,
-                   options_.hold_mass > 0 ? held_ : compositeBody(robot_.model(), q));
-  }
-
-  /// (3.11): A, and what stands beside stiffness and damping on its right.
-  void split(const JointState& q, const VectorXd& eta_dot, MatrixXd& A, VectorXd& right) const {
-    const RigidBody robot = lockedInP(q.q);
-    A = augmentedModalMass(base_, robot);
-    const auto Phi_u = base_.Phi.topRows<3>(), Phi_l = base_.Phi.bottomRows<3>();
-    const Mat3 Rx = skew(robot.p_BoBcm_B);
-    const Vec3 w = Phi_l * eta_dot;
-    const Vec3 centripetal = robot.mass * w.cross(Rx * w);
-    right += (Phi_u.transpose() + Phi_l.transpose() * Rx) * centripetal;
-    right += base_.Phi.transpose() * reaction(q, ProperMotion{}).stacked();
-  }
-
-  void whole(const JointState& q, const VectorXd& y, MatrixXd& A, VectorXd& right) const {
-    const Eigen::Index k = modes();
-    const BodyMotion P = platform(y);
-    // The wrench is affine in the base's acceleration: this much without, the locked mass with it.
-    const Wrench F_Po_P = reaction(q, properMotion(P, X_PL0_, Vec3::Zero()));
-    const MatrixXd J = jacobian(y);
-    right += J.transpose() * rotate(P.X.R, F_Po_P).stacked();
-    const Mat6 M_1 = spatialMass(
-        rotated(P.X.R, combine(RigidBody{}, X_PL0_, compositeBody(robot_.model(), q.q))));
-    A = MatrixXd::Identity(k, k) + J.transpose() * M_1 * J;
-  }
-
   const Interaction& interaction_;
-  const ModalModel& base_;
   MovingRobot robot_;
   Transform X_PL0_;
-  const InteractionOptions& options_;
-  std::int64_t now_ = 0;       // [ns] start of the interval
-  std::int64_t held_at_ = -1;  // [-] step that A was last computed for
-  RigidBody held_;
+  VehicleEquations vehicle_;
+  std::int64_t now_ = 0;           // [ns] start of the interval
   std::optional<Transform> X_TB_;  // of the target, in the tool's grip
   ContactWatch contacts_;
   std::optional<BegunPush> push_;
@@ -299,9 +246,9 @@ std::vector<InteractionPoint> simulate(const Interaction& interaction,
   system.jacobian = nullptr;
   system.dimension = equations.size();
   system.params = &equations;
-  const double milli = 1e-3 / interaction.base.Phi.cwiseAbs().maxCoeff();  // of eta, at the tip
-  const std::unique_ptr<gsl_odeiv2_driver, FreeDriver> driver(gsl_odeiv2_driver_alloc_y_new(
-      &system, gsl_odeiv2_step_rk8pd, 1e-3, options.tolerance * milli, options.tolerance));
+  const std::unique_ptr<gsl_odeiv2_driver, FreeDriver> driver(
+      gsl_odeiv2_driver_alloc_y_new(&system, gsl_odeiv2_step_rk8pd, 1e-3,
+                                    options.tolerance * equations.milli(), options.tolerance));
 
   returnGslErrors();
   std::vector<InteractionPoint> out;

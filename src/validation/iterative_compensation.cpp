@@ -105,7 +105,7 @@ IterativeResult compensateIteratively(const Experiment& experiment, const Iterat
     Wrenches weight, felt;
     if (!passes.feel(out.path, options.slower, weight) || !passes.feel(out.path, 1, felt))
       return out;
-    AdmittanceModel model(experiment.controller.admittance, period);
+    AdmittanceModel model(experiment.controller.vehicle, period);
     model.reset(out.path.col(0));
     RecordedPath answer = out.path;
     for (Eigen::Index n = 1; n < answer.cols(); ++n) {

@@ -18,7 +18,7 @@ void updateRate(Reproduction& r) {
     const Reproduction::Run run =
         r.run("free_decay", {fmt::format("controller.period_ns={}", period)});
     const Motion m = commanded(run.series);
-    const ModalModel& base = run.series.experiment.controller.admittance;
+    const ModalModel base = linearised(run.series.experiment.controller.vehicle);
     const Eigen::VectorXd eta0 = leastSquares(base.Phi, m.x.front());
     for (std::size_t n = 0; n < m.t.size(); ++n) {
       Eigen::VectorXd eta = eta0;

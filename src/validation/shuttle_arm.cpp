@@ -84,7 +84,7 @@ Motion onTheArmAlone(Reproduction& r, const std::string& configuration, const st
     return travel(simulated(changed, InteractionModel::kWhole)).peak_position;
   };
   const double full = peak({more}), half = peak({more, "base.arm.stiffness_scale=0.5"});
-  const auto modes = e.controller.admittance.stiffness.size();
+  const auto modes = linearised(e.controller.vehicle).stiffness.size();
   Numbers& n = r.numbers["srms"][configuration + "_" + robot];
   n["modes_kept"] = modes;
   n["displacement_max_m"] = travelled.peak_position;

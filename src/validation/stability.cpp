@@ -82,17 +82,18 @@ void massRatiosOfTheRuns(Reproduction& r) {
       const Experiment filtered = r.load(scenario, {"base.keep_modes=6", "legs.filters=outputs"});
       const JointVector& q = e.plant.task.initial_joints;
       const Loop loop = loopOf(six.controller, q, Direction::kExtending);
-      const double ratio = massRatios(e.controller.admittance, loop.robot_P)(0);
+      const double ratio = massRatios(linearised(e.controller.vehicle), loop.robot_P)(0);
       const double ratio_six = massRatios(loop.base, loop.robot_P)(0);
       const int none = stableModes(six.controller, q);
       const int outputs = stableModes(filtered.controller, q);
       kept_below += ratio <= 1.0;
       six_below += ratio_six <= 1.0;
       ++of;
-      table.push_back(
-          {title(configuration, robot), fmt::format("{}", e.controller.admittance.stiffness.size()),
-           fmt::format("{:.2f}", ratio), fmt::format("{:.2f}", ratio_six),
-           fmt::format("{}{}", none, none == 6 ? " (of 6)" : ""), fmt::format("{}", outputs)});
+      table.push_back({title(configuration, robot),
+                       fmt::format("{}", linearised(e.controller.vehicle).stiffness.size()),
+                       fmt::format("{:.2f}", ratio), fmt::format("{:.2f}", ratio_six),
+                       fmt::format("{}{}", none, none == 6 ? " (of 6)" : ""),
+                       fmt::format("{}", outputs)});
       Numbers& n = r.numbers["appendix_e"]["mass_ratios"][configuration + "_" + robot];
       n["kept"] = ratio;
       n["six_modes"] = ratio_six;

@@ -30,7 +30,7 @@ target_link_libraries(push PRIVATE ves::control)
 file(WRITE ${WORK}/flags/push.cpp [[
 // 10 kg on 1000 N/m without damping, 1 N for 1 s: x = F/k (1 - cos(sqrt(k/m) t)).
 #include <cmath>
-#include <ves/control/admittance_model.hpp>
+#include <ves/vehicle/admittance_model.hpp>
 int main() {
   ves::ModalModel m;
   m.Phi = ves::Vec6::Unit(0) / std::sqrt(10.0);

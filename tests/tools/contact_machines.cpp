@@ -19,10 +19,10 @@
 
 #include "machines.hpp"
 #include "support/rig.hpp"
-#include "ves/analysis/leaning.hpp"
 #include "ves/analysis/gate.hpp"
-#include "ves/math/dense.hpp"
+#include "ves/analysis/leaning.hpp"
 #include "ves/evaluation/contact_pairs.hpp"
+#include "ves/math/dense.hpp"
 
 namespace ves {
 namespace {
@@ -90,9 +90,9 @@ struct Books {
   explicit Books(const Experiment& experiment)
       : e(experiment),
         M_1(spatialMass(lockedRobot(e.controller.payload, e.plant.task.initial_joints))),
-        inverse(leastSquares(e.controller.admittance.Phi, Mat6::Identity())) {}
+        inverse(leastSquares(linearised(e.controller.vehicle).Phi, Mat6::Identity())) {}
   double operator()(const Vec6& x, const Vec6& x_dot, const Floating& target) const {
-    const ModalModel& base = e.controller.admittance;
+    const ModalModel base = linearised(e.controller.vehicle);
     const Eigen::VectorXd eta = inverse * x, eta_dot = inverse * x_dot;
     const Target& body = *e.plant.task.world->environment.target;
     const Mat3 I = target.X_IB().R * body.I_Bcm_B * target.X_IB().R.transpose();

@@ -3,7 +3,7 @@
 // The admittance model alone: a mass on a spring that is pushed, 100 times a second.
 #include <cmath>
 #include <cstdio>
-#include <ves/control/admittance_model.hpp>
+#include <ves/vehicle/admittance_model.hpp>
 
 int main() {
   const double mass = 500.0, omega = 2.0 * M_PI * 0.5, zeta = 0.05, T = 0.01, push = 40.0;

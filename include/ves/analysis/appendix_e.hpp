@@ -7,7 +7,7 @@
 #include <array>
 #include <complex>
 
-#include "ves/control/admittance_model.hpp"
+#include "ves/vehicle/admittance_model.hpp"
 #include "ves/robot/robot_model.hpp"
 
 namespace ves {

@@ -12,15 +12,15 @@
 
 namespace ves {
 
-/// The base that a robot stands on, by its modes at the robot's foot.
+/// The base that a robot stands on, by its motion at the robot's foot.
 struct Base {
-  ModalModel modes;               // those that are kept
+  VehicleModel vehicle;           // by the modes that are kept, or a body that floats
   std::optional<ArmModel> arm;    // that they are of
   std::optional<ArmShape> shape;  // of the arm, by the same modal coordinates
 };
 
-/// One of three: `mass`, `damping`, `stiffness` (6 x 6); `modes`, a table from elsewhere; `arm`, a
-/// chain of beams. Throws InputError.
+/// One of four: `mass`, `damping`, `stiffness` (6 x 6); `modes`, a table from elsewhere; `arm`, a
+/// chain of beams; `free`, a body that floats. Throws InputError.
 Base readBase(Section section);
 
 /// A file of config/bases; `overrides` are "key.path=value". Throws InputError.

@@ -18,8 +18,7 @@ struct AdmittanceInput {
   const Wrench& F_Po_I;
   const Wrench& at_port;       // F_Po_I before dead band and low-pass
   const Mat6& noise;           // covariance of F_Po_I's noise (wrenchNoise)
-  const Mat6& M_1;             // of the composite body that is compensated,
-  const Mat6& M_1_before;      // and before the newest sample
+  const CarriedBody& body;     // the composite body that is compensated
   double share;                // [-] of the compensation
   const WrenchTiming& wrench;  // when F_Po_I was read
   const Lesson& lesson;        // what was found out

@@ -5,13 +5,13 @@
 #pragma once
 
 #include "ves/contract/order.hpp"
-#include "ves/control/admittance_model.hpp"
 #include "ves/control/force_measurement.hpp"
 #include "ves/control/program.hpp"
 #include "ves/control/safety_checks.hpp"
 #include "ves/control/servo.hpp"
 #include "ves/control/wrench_filter.hpp"
 #include "ves/robot/payload.hpp"
+#include "ves/vehicle/admittance_model.hpp"
 
 namespace ves {
 
@@ -104,7 +104,7 @@ struct Belief {
   Hand hand;                         // where the robot holds things,
   ToldLoads told_loads;              // and what it takes in hand
   Vec3 gravity = {0.0, 0.0, -9.81};  // [m/s^2] g_I
-  ModalModel admittance;             // the vehicle
+  VehicleModel vehicle;
   LegCodec legs;
   ServoModel servo;
   Resonance resonance;  // the lowest, with the least damping of any

@@ -5,8 +5,8 @@
 // and is given to it by and by.
 #pragma once
 
-#include "ves/control/admittance_model.hpp"
 #include "ves/robot/mass_regressor.hpp"
+#include "ves/vehicle/admittance_model.hpp"
 
 namespace ves {
 

@@ -7,6 +7,7 @@
 #include "ves/control/controller_config.hpp"
 #include "ves/control/tick_clock.hpp"
 #include "ves/math/butterworth.hpp"
+#include "ves/vehicle/modal_vehicle.hpp"
 
 namespace ves {
 
@@ -93,8 +94,13 @@ class RobotInertia {
 
   /// Of the composite body about Po in I, times the share. [kg, kg m, kg m^2]
   const Mat6& M_1() const noexcept { return M_1_; }
-  /// The same before the newest sample, the share as now.
-  const Mat6& before() const noexcept { return before_; }
+  /// The same and before the newest sample, the share as now, with the attitudes they were seen at.
+  CarriedBody carried() const noexcept {
+    CarriedBody out(before_, M_1_);
+    out.R_IP_before = R_IP_before_;
+    out.R_IP = R_IP_;
+    return out;
+  }
   /// Of the platform in I, when the newest sample was taken, its accelerations as the wrench shows
   /// them; zero where it is not looked at.
   const BodyMotion& platform() const noexcept { return platform_; }
@@ -108,7 +114,8 @@ class RobotInertia {
   bool known_ = false;         // composite_P_, since the legs were engaged
   Mat6 whole_ = Mat6::Zero();  // M_1 of all of it
   Mat6 whole_before_ = Mat6::Zero();
-  double since_ = 0.0;  // [s] between the two
+  Mat3 R_IP_ = Mat3::Identity(), R_IP_before_ = Mat3::Identity();  // where they were so
+  double since_ = 0.0;                                             // [s] between the two
   Mat6 M_1_ = Mat6::Zero(), before_ = Mat6::Zero();
   BodyMotion platform_;
 };

@@ -9,7 +9,7 @@
 // its swing; one that rests under a load waits where stiffening would lift the load.
 #pragma once
 
-#include "ves/control/admittance_model.hpp"
+#include "ves/vehicle/admittance_model.hpp"
 
 namespace ves {
 

@@ -64,11 +64,9 @@ struct Emulation {
 /// or filters share one: it depends on nothing but what is compared here.
 class ReferenceMotions {
  public:
-  /// SRMS-robot with nothing left out, the modes at rest at eta. None where the motion grows
-  /// without bound.
+  /// SRMS-robot with nothing left out. None where the motion grows without bound.
   std::shared_ptr<const std::optional<Motion>> of(const Interaction& interaction, std::int64_t step,
-                                                  std::int64_t duration,
-                                                  const Eigen::VectorXd& eta);
+                                                  std::int64_t duration);
   int computed() const { return computed_; }  // [-]
 
  private:
@@ -76,12 +74,8 @@ class ReferenceMotions {
   struct Asked {
     Interaction interaction;
     std::int64_t step, duration;  // [ns]
-    Eigen::VectorXd eta;
 
-    bool operator==(const Asked& o) const {
-      return interaction == o.interaction && step == o.step && duration == o.duration &&
-             eta == o.eta;
-    }
+    bool operator==(const Asked&) const = default;
   };
   Memo<Asked, std::optional<Motion>, kKept> known_;
   std::atomic<int> computed_ = 0;

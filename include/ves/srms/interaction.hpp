@@ -11,6 +11,7 @@
 //           emulation, x = rest + Phi eta are position and fixed angles (2.19) however far the base
 //           turns; the wrench does its work on the modes through the Jacobian of these angles, so
 //           that energy is conserved. For small angles that is Phi^T F (C.4).
+// A vehicle that floats freely has the second alone, by the momentum of it and the robot.
 #pragma once
 
 #include <cstdint>
@@ -18,9 +19,9 @@
 #include <vector>
 
 #include "ves/contact/contact_watch.hpp"
-#include "ves/control/admittance_model.hpp"
 #include "ves/planning/moving_robot.hpp"
 #include "ves/robot/payload.hpp"
+#include "ves/vehicle/admittance_model.hpp"
 
 namespace ves {
 
@@ -33,13 +34,14 @@ struct TimedAction {
 
 /// The two that meet.
 struct Interaction {
-  ModalModel base;                       // at Po
+  VehicleModel vehicle;                  // at Po
   Payload payload;                       // what stands on it
   JointVector q0 = JointVector::Zero();  // [rad | m]
   std::vector<TimedAction> actions;      // of the robot, by time
   std::optional<World> world;            // what its tool touches
   Vec3 p_IH = Vec3::Zero();              // [m] where P is in I when the base is at x = 0
-  Vec6 rest = Vec6::Zero();  // [m, rad] constant part of x, which the modes do not express
+  Vec6 start =
+      Vec6::Zero();  // [m, rad] x where it is let go; what modes do not express of it stays
 
   bool operator==(const Interaction&) const = default;
 };
@@ -54,16 +56,16 @@ struct InteractionOptions {
   // Steps that A of (3.11) is kept for, the report's shortcut; 0: it follows the robot
   // continuously.
   int hold_mass = 0;
-  Eigen::VectorXd eta, eta_dot;  // at the start; empty: rest
+  Eigen::VectorXd eta, eta_dot;  // of modes at the start, beside Interaction::start; empty: none
 };
 
 /// The base at one time.
 struct InteractionPoint {
-  double t = 0.0;             // [s]
-  Vec6 x = Vec6::Zero();      // [m, rad] rest + Phi eta (3.13a)
-  Vec6 x_dot = Vec6::Zero();  // [m/s, rad/s] Phi eta'
-  Eigen::VectorXd eta, eta_dot;
-  Touch touch;  // where there is a world
+  double t = 0.0;                // [s]
+  Vec6 x = Vec6::Zero();         // [m, rad] of modes rest + Phi eta (3.13a)
+  Vec6 x_dot = Vec6::Zero();     // [m/s, rad/s] of modes Phi eta'
+  Eigen::VectorXd eta, eta_dot;  // of modes
+  Touch touch;                   // where there is a world
   Floating target;
   ContactWatch contacts;  // up to now
 };

@@ -3,7 +3,7 @@
 // Modes of a beam frame.
 #pragma once
 
-#include "ves/control/admittance_model.hpp"
+#include "ves/vehicle/admittance_model.hpp"
 
 namespace ves {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "ves/control/admittance_model.hpp"
+#include "ves/vehicle/modal_vehicle.hpp"
 
 #include <Eigen/LU>
 #include <algorithm>
@@ -197,7 +197,7 @@ ModalDynamics::Modes ModalDynamics::advance(const Body& body, double dt, const M
   return sum;
 }
 
-AdmittanceModel::AdmittanceModel(const ModalModel& model, double period)
+ModalVehicle::ModalVehicle(const ModalModel& model, double period)
     : nominal_(model),
       dynamics_(nominal_),
       Phi_pinv_(leastSquares(model.Phi, Mat6::Identity())),
@@ -208,19 +208,19 @@ AdmittanceModel::AdmittanceModel(const ModalModel& model, double period)
   damping_.setZero(dynamics_.size());
 }
 
-void AdmittanceModel::become(const VehicleFactors& factors) noexcept {
+void ModalVehicle::become(const VehicleFactors& factors) noexcept {
   if (factors == factors_) return;
   factors_ = factors;
   dynamics_ = nominal_.scaled(factors);
   if (!dynamics_.coupled()) step_ = dynamics_.hold(period_);
 }
 
-double AdmittanceModel::costOf(const VehicleFactors& to) const noexcept {
+double ModalVehicle::costOf(const VehicleFactors& to) const noexcept {
   return (to.mass - factors_.mass) * 0.5 * now_.modes.eta_dot.squaredNorm() +
          (to.stiffness - factors_.stiffness) * nominal_.potentialEnergy(now_.modes);
 }
 
-void AdmittanceModel::reset(const Vec6& x, const Mat6& M_1, double ahead) noexcept {
+void ModalVehicle::reset(const Vec6& x, const Mat6& M_1, double ahead) noexcept {
   constexpr double kMostGrowth = 5.0;  // [-] exponent of a damped mode's way back
   const auto& Phi = dynamics_.Phi();
   Modes& modes = now_.modes;
@@ -238,7 +238,7 @@ void AdmittanceModel::reset(const Vec6& x, const Mat6& M_1, double ahead) noexce
   modes = light.advance(light.body(working(M_1) / factors_.mass), -ahead, modes, none);
 }
 
-void AdmittanceModel::step(const Wrench& F_Po_I, double damping) noexcept {
+void ModalVehicle::step(const Wrench& F_Po_I, double damping) noexcept {
   before_ = now_;
   dt_ = period_;
   mobility_ = dynamics_.mobility();
@@ -259,8 +259,8 @@ void AdmittanceModel::step(const Wrench& F_Po_I, double damping) noexcept {
   }
 }
 
-void AdmittanceModel::step(const Wrench& F_Po_I, const Carried& carried, double dt, double ahead,
-                           double damping) noexcept {
+void ModalVehicle::step(const Wrench& F_Po_I, const CarriedBody& carried, double dt, double ahead,
+                        double damping) noexcept {
   before_ = now_;
   // What the body's momentum loses by another shape or attitude goes to base and body. The moment
   // of a body that slides is not in it: r' x v is no torque about a point that slides along.
@@ -292,25 +292,25 @@ void AdmittanceModel::step(const Wrench& F_Po_I, const Carried& carried, double 
   }
 }
 
-Vec6 AdmittanceModel::coordinates(const Modes& modes) const noexcept {
+Vec6 ModalVehicle::coordinates(const Modes& modes) const noexcept {
   Vec6 x = offset_;
   x.noalias() += dynamics_.Phi() * modes.eta;
   return x;
 }
 
-Vec3 AdmittanceModel::angleRates(const Modes& modes) const noexcept {
+Vec3 ModalVehicle::angleRates(const Modes& modes) const noexcept {
   return dynamics_.Phi().bottomRows<3>() * modes.eta_dot;
 }
 
-Mat6 AdmittanceModel::working(const Mat6& M_1) const noexcept {
+Mat6 ModalVehicle::working(const Mat6& M_1) const noexcept {
   Mat6 out = M_1;
   out.rightCols<3>() = M_1.rightCols<3>() * E_;
   out.bottomRows<3>() = (E_.transpose() * out.bottomRows<3>()).eval();
   return out;
 }
 
-PathPoint<6> AdmittanceModel::at(
-    const Modes& modes, const ModalDynamics::Vector<kMaxModes>& acceleration) const noexcept {
+PathPoint<6> ModalVehicle::at(const Modes& modes,
+                              const ModalDynamics::Vector<kMaxModes>& acceleration) const noexcept {
   const auto& Phi = dynamics_.Phi();
   PathPoint<6> out;
   out.x = coordinates(modes);
@@ -319,7 +319,7 @@ PathPoint<6> AdmittanceModel::at(
   return out;
 }
 
-void AdmittanceModel::displace(const Modes& by) noexcept {
+void ModalVehicle::displace(const Modes& by) noexcept {
   const auto& Phi = dynamics_.Phi();
   now_.modes.eta += by.eta;
   now_.modes.eta_dot += by.eta_dot;
@@ -327,7 +327,7 @@ void AdmittanceModel::displace(const Modes& by) noexcept {
   now_.motion.x_dot.noalias() += Phi * by.eta_dot;
 }
 
-void AdmittanceModel::slow(double share) noexcept {
+void ModalVehicle::slow(double share) noexcept {
   Modes& modes = now_.modes;
   PathPoint<6>& motion = now_.motion;  // which may be ahead of the modes
   modes.eta = before_.modes.eta + share * (modes.eta - before_.modes.eta);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Admittance model (Appendices C and D): the base that the platform pretends to be.
+// The report's vehicle (Appendices C and D): a base of linear modes.
 #pragma once
 
 #include "ves/contract/order.hpp"
@@ -119,6 +119,17 @@ class ModalDynamics {
   Square damping_;  // when coupled
 };
 
+/// A rigid body on a vehicle, about Po in I, whose inertia is not in the wrench.
+struct CarriedBody {
+  CarriedBody(const Mat6& M_1_before, const Mat6& M_1_now) : before(M_1_before), M_1(M_1_now) {}
+  CarriedBody(const Mat6& kept) : CarriedBody(kept, kept) {}
+
+  Mat6 before;  // in the step before
+  Mat6 M_1;
+  // Attitudes of the platform that the two were seen at: how it lies on the vehicle.
+  Mat3 R_IP_before = Mat3::Identity(), R_IP = Mat3::Identity();
+};
+
 /// Steps a modal model by the exact zero-order hold. Coordinates are those of Pose about home.
 /// Without a body they are taken as small: the wrench's moments drive the fixed angles directly, as
 /// in (C.2). With one, moments do their work on them, and rates are those of the body, however far
@@ -126,10 +137,10 @@ class ModalDynamics {
 ///
 /// Its mass m, damping c and stiffness k may be changed, all modes alike: m eta'' + c C eta' + k K
 /// eta = Phi^T W.
-class AdmittanceModel {
+class ModalVehicle {
  public:
   /// Discretises for the period [s].
-  AdmittanceModel(const ModalModel& model, double period);
+  ModalVehicle(const ModalModel& model, double period);
 
   /// motion() is at rest at x. What the modes cannot express of x stays as a constant offset. Where
   /// motion() is predicted `ahead` [s] of the modes, these are propagated back by `ahead` along the
@@ -141,18 +152,10 @@ class AdmittanceModel {
   /// held with W; not in a step in which the vehicle turns round, and it would push.
   void step(const Wrench& F_Po_I, double damping = 0.0) noexcept;
 
-  /// A rigid body on the base, about Po in I, whose inertia is not in F_Po_I.
-  struct Carried {
-    Carried(const Mat6& M_1_before, const Mat6& M_1_now) : before(M_1_before), M_1(M_1_now) {}
-    Carried(const Mat6& kept) : Carried(kept, kept) {}
-
-    Mat6 before;  // in the step before
-    Mat6 M_1;
-  };
   /// The same `dt` [s] after, with a rigid body on the base: the left-hand side of (3.11), where
   /// the body changes as that of momenta: what it turns with is passed on. motion() is `ahead` [s]
   /// of that, F_Po_I held. dt of 0: F_Po_I has acted already.
-  void step(const Wrench& F_Po_I, const Carried& body, double dt, double ahead,
+  void step(const Wrench& F_Po_I, const CarriedBody& body, double dt, double ahead,
             double damping = 0.0) noexcept;
 
   /// Takes back all but `share` of the last step, and of the rate it led to: all modes alike, so
@@ -204,6 +207,10 @@ class AdmittanceModel {
   const PathPoint<6>& motion() const noexcept { return now_.motion; }
 
   const ModalDynamics& dynamics() const noexcept { return dynamics_; }
+  /// Where it is, with the body M_1 on it, for motions beside this one.
+  ModalDynamics::Body body(const Mat6& M_1) const noexcept {
+    return dynamics_.body(M_1 / factors_.mass);
+  }
   int modes() const noexcept { return static_cast<int>(dynamics_.size()); }
   bool coupled() const noexcept { return dynamics_.coupled(); }
 

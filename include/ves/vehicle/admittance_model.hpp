@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// The admittance model: the vehicle that the platform pretends to be, of one kind or another. It
+// takes the wrench of the robot on it and says how it moves. Nobody else asks which kind it is, but
+// who reads one from a file.
+#pragma once
+
+#include <variant>
+
+#include "ves/vehicle/free_body.hpp"
+#include "ves/vehicle/modal_vehicle.hpp"
+
+namespace ves {
+
+/// What is emulated.
+using VehicleModel = std::variant<ModalModel, FreeBodyModel>;
+
+/// Its modes about home: what can be said of it before it moves far.
+ModalModel linearised(const VehicleModel& model);
+
+/// It steps.
+class AdmittanceModel {
+  using Kinds = std::variant<ModalVehicle, FreeBody>;
+
+  template <typename F>
+  decltype(auto) each(F&& f) noexcept {
+    return std::visit(f, kind_);
+  }
+  template <typename F>
+  decltype(auto) each(F&& f) const noexcept {
+    return std::visit(f, kind_);
+  }
+
+  Kinds kind_;
+
+ public:
+  /// For the period [s].
+  AdmittanceModel(const VehicleModel& model, double period);
+
+  /// motion() is at x: at rest, or as the model says that it is let go. Where motion() is predicted
+  /// `ahead` [s], it begins with that prediction, M_1 on it.
+  void reset(const Vec6& x, const Mat6& M_1 = Mat6::Zero(), double ahead = 0.0) noexcept {
+    return each([&](auto& v) { v.reset(x, M_1, ahead); });
+  }
+  /// One period after F_Po_I began to act. `damping` [1/s] acts on all of its motion besides, held
+  /// with F_Po_I; not in a step in which the vehicle turns round, and it would push.
+  void step(const Wrench& F_Po_I, double damping = 0.0) noexcept {
+    return each([&](auto& v) { v.step(F_Po_I, damping); });
+  }
+  /// The same `dt` [s] after, with a rigid body on the vehicle: the left-hand side of (3.11), where
+  /// the body changes as that of momenta: what it turns with is passed on. motion() is `ahead` [s]
+  /// of that, F_Po_I held. dt of 0: F_Po_I has acted already.
+  void step(const Wrench& F_Po_I, const CarriedBody& body, double dt, double ahead,
+            double damping = 0.0) noexcept {
+    return each([&](auto& v) { v.step(F_Po_I, body, dt, ahead, damping); });
+  }
+  /// Takes back all but `share` of the last step, and of the rate it led to: the path stays and
+  /// only the motion along it is slowed.
+  void slow(double share) noexcept {
+    return each([&](auto& v) { v.slow(share); });
+  }
+  /// Is elsewhere by so much, and as much faster, from the last step's end on; of dynamics().
+  void displace(const ModalDynamics::Modes& by) noexcept {
+    return each([&](auto& v) { v.displace(by); });
+  }
+
+  /// The next step's vehicle, where and as fast as this one is.
+  void become(const VehicleFactors& factors) noexcept {
+    return each([&](auto& v) { v.become(factors); });
+  }
+  const VehicleFactors& factors() const noexcept {
+    return each([](const auto& v) -> const VehicleFactors& { return v.factors(); });
+  }
+  /// [J] that becoming so puts in.
+  double costOf(const VehicleFactors& factors) const noexcept {
+    return each([&](const auto& v) { return v.costOf(factors); });
+  }
+  /// Whether a step of such a vehicle is short enough for a tick.
+  bool affords(const VehicleFactors& factors) const noexcept {
+    return each([&](const auto& v) { return v.affords(factors); });
+  }
+
+  /// [J] of the vehicle alone.
+  double kineticEnergy() const noexcept {
+    return each([](const auto& v) { return v.kineticEnergy(); });
+  }
+  double energy() const noexcept {
+    return each([](const auto& v) { return v.energy(); });
+  }
+  /// [J] that the last step took of F_Po_I, and that `damping` took in it.
+  double taken(const Wrench& F_Po_I) const noexcept {
+    return each([&](const auto& v) { return v.taken(F_Po_I); });
+  }
+  double damped() const noexcept {
+    return each([](const auto& v) { return v.damped(); });
+  }
+  /// [J] that the vehicle's own damping took in it.
+  double dissipated() const noexcept {
+    return each([](const auto& v) { return v.dissipated(); });
+  }
+  /// [J] that a step takes on average of noise in F_Po_I, of this covariance: of the speed that a
+  /// wrench leads to in a step, the next steps have all, this one half.
+  double takenOfNoise(const Mat6& covariance) const noexcept {
+    return each([&](const auto& v) { return v.takenOfNoise(covariance); });
+  }
+
+  /// (C.7): position, velocity, acceleration at the last step's end, or ahead of it.
+  const PathPoint<6>& motion() const noexcept {
+    return each([](const auto& v) -> const PathPoint<6>& { return v.motion(); });
+  }
+
+  /// Motions beside this one, small: their coordinates, and the vehicle where it is with the body
+  /// M_1 on it, for wrenches over factors().mass.
+  const ModalDynamics& dynamics() const noexcept {
+    return each([](const auto& v) -> const ModalDynamics& { return v.dynamics(); });
+  }
+  ModalDynamics::Body body(const Mat6& M_1) const noexcept {
+    return each([&](const auto& v) { return v.body(M_1); });
+  }
+  int modes() const noexcept {
+    return each([](const auto& v) { return v.modes(); });
+  }
+  bool coupled() const noexcept {
+    return each([](const auto& v) { return v.coupled(); });
+  }
+};
+
+}  // namespace ves

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// A vehicle that nothing holds: a satellite, whose robot floats with it. Beyond the report.
+//
+//   m v' + (w x S)' = f,   S x v' + (J w)' = n
+//
+// of vehicle and robot as one body with its joints locked, at Po in I: m its mass, S its first
+// moment, J its inertia. f and n are what the sensor shows beyond that body, as for any vehicle:
+// what the joints' momentum loses. Its own turn is integrated about the common centre of mass,
+// where the angular momentum stays the same to rounding while nothing acts.
+#pragma once
+
+#include "ves/robot/robot_model.hpp"
+#include "ves/vehicle/modal_vehicle.hpp"
+
+namespace ves {
+
+/// What floats, and how it moves when it is let go.
+struct FreeBodyModel {
+  RigidBody body_P;
+  Vec3 v_IPo_I = Vec3::Zero();  // [m/s]
+  Vec3 w_IP_I = Vec3::Zero();   // [rad/s]
+
+  bool operator==(const FreeBodyModel&) const = default;
+};
+
+/// Its six modes about home, which have no stiffness.
+ModalModel linearised(const FreeBodyModel& model);
+
+/// Position and velocity of P in I, its position from home.
+struct RigidState {
+  Mat3 R_IP = Mat3::Identity();
+  Vec3 p = Vec3::Zero();  // [m]
+  Vec3 v = Vec3::Zero();  // [m/s]
+  Vec3 w = Vec3::Zero();  // [rad/s]
+};
+
+/// Over dt [s], which may be negative, under a held wrench, about Po in I: a body whose spatial
+/// mass about Po in P goes evenly from M_P to M_then_P, of one mass. The attitude by Runge and
+/// Kutta's steps of fourth order in the rotation vector, of at most 5 mrad each. The momentum that
+/// the wrench leaves is kept: to rounding where the shape stays, else as far as a step's change of
+/// it is even.
+RigidState advanced(const Mat6& M_P, const Mat6& M_then_P, const RigidState& from,
+                    const Wrench& F_Po_I, double dt) noexcept;
+
+/// Steps it. The members are ModalVehicle's.
+class FreeBody {
+ public:
+  FreeBody(const FreeBodyModel& model, double period);  // [s]
+
+  void reset(const Vec6& x, const Mat6& M_1 = Mat6::Zero(), double ahead = 0.0) noexcept;
+  void step(const Wrench& F_Po_I, double damping = 0.0) noexcept;
+  void step(const Wrench& F_Po_I, const CarriedBody& body, double dt, double ahead,
+            double damping = 0.0) noexcept;
+  void slow(double share) noexcept;
+  void displace(const ModalDynamics::Modes& by) noexcept;
+
+  void become(const VehicleFactors& factors) noexcept { factors_ = factors; }
+  const VehicleFactors& factors() const noexcept { return factors_; }
+  double costOf(const VehicleFactors& to) const noexcept {
+    return (to.mass / factors_.mass - 1.0) * kineticEnergy();
+  }
+  bool affords(const VehicleFactors&) const noexcept { return true; }
+
+  double kineticEnergy() const noexcept;
+  double energy() const noexcept { return kineticEnergy(); }
+  double taken(const Wrench& F_Po_I) const noexcept { return F_Po_I.stacked().dot(way_); }
+  double dissipated() const noexcept { return 0.0; }
+  double takenOfNoise(const Mat6& covariance) const noexcept {
+    return 0.5 * dt_ * dt_ * covariance.cwiseProduct(mobility_).sum();
+  }
+  double damped() const noexcept { return -damping_.dot(way_); }
+
+  const PathPoint<6>& motion() const noexcept { return now_.motion; }
+
+  /// Six coordinates of a motion beside this one, small, in I: without stiffness or damping, the
+  /// vehicle's mass less 1 counted to the body on it.
+  const ModalDynamics& dynamics() const noexcept { return beside_; }
+  ModalDynamics::Body body(const Mat6& M_1) const noexcept;
+  int modes() const noexcept { return 6; }
+  bool coupled() const noexcept { return false; }
+
+  /// At the last step's end, not ahead of it.
+  const RigidState& state() const noexcept { return now_.rigid; }
+
+ private:
+  struct State {
+    RigidState rigid;
+    PathPoint<6> motion;
+  };
+
+  Mat6 massInP() const noexcept { return factors_.mass * M_P_; }
+
+  FreeBodyModel model_;
+  Mat6 M_P_;  // about Po in P
+  ModalDynamics beside_;
+  double period_;  // [s]
+  VehicleFactors factors_;
+  double dt_ = 0.0;  // [s] of the last step
+  State now_, before_;
+  Vec6 way_ = Vec6::Zero();       // [m, rad] of the last step, in I
+  Vec6 damping_ = Vec6::Zero();   // [N, N m] in it
+  Mat6 mobility_ = Mat6::Zero();  // [1/kg] in it: acceleration per wrench
+};
+
+}  // namespace ves

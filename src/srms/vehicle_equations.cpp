@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "vehicle_equations.hpp"
+
+#include <Eigen/LU>
+
+#include "ves/kinematics/stewart.hpp"
+#include "ves/math/dense.hpp"
+#include "ves/robot/momentum.hpp"
+#include "ves/robot/newton_euler.hpp"
+
+namespace ves {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr Eigen::Index kAttitude = 3, kMomentum = 7, kStates = 13;  // of a free body
+
+/// What the vehicle feels of the robot, about Po in P.
+Wrench reaction(const RidingRobot& robot, const ProperMotion& L0) {
+  return transfer(robot.X_PL0, Wrench{} - newtonEuler(robot.model, robot.q, L0).F_L0o_L0);
+}
+
+RigidBody lockedInP(const RidingRobot& robot) {
+  return combine(RigidBody{}, robot.X_PL0, compositeBody(robot.model, robot.q.q));
+}
+
+}  // namespace
+
+ModalEquations::ModalEquations(const ModalModel& base, const Interaction& interaction,
+                               const InteractionOptions& options)
+    : base_(base),
+      options_(options),
+      p_IH_(interaction.p_IH),
+      eta_(leastSquares(base.Phi, interaction.start)),
+      rest_(interaction.start - base.Phi * eta_) {}
+
+VectorXd ModalEquations::start(const RidingRobot&) const {
+  VectorXd y = VectorXd::Zero(size());
+  y.head(modes()) = eta_;
+  if (options_.eta.size()) y.head(modes()) += options_.eta;
+  if (options_.eta_dot.size()) y.tail(modes()) = options_.eta_dot;
+  return y;
+}
+
+void ModalEquations::begin(const RidingRobot& robot, std::int64_t step) {
+  if (options_.hold_mass == 0 || step % options_.hold_mass != 0 || step == held_at_) return;
+  held_at_ = step;
+  held_ = compositeBody(robot.model, robot.q.q);
+}
+
+BodyMotion ModalEquations::platform(const RidingRobot&, const VectorXd& y) const {
+  const Vec6 x_dot = base_.Phi * y.segment(modes(), modes());
+  return bodyMotion(p_IH_, Pose::from(coordinates(y)), x_dot, Vec6::Zero());
+}
+
+void ModalEquations::derivative(const RidingRobot& robot, const VectorXd& y, const Wrench& F_Po_I,
+                                VectorXd& dy) const {
+  const Eigen::Index k = modes();
+  const auto eta = y.head(k), eta_dot = y.segment(k, k);
+  dy.head(k) = eta_dot;
+  VectorXd right = -base_.stiffness.cwiseProduct(eta) - base_.damping * eta_dot;
+  MatrixXd A;
+  if (options_.model == InteractionModel::kSplit)
+    split(robot, y, A, right);
+  else
+    whole(robot, y, A, right);
+  right += jacobian(y).transpose() * F_Po_I.stacked();
+  dy.segment(k, k) = solvePositive(A, right);
+}
+
+void ModalEquations::tell(const RidingRobot&, const VectorXd& y, InteractionPoint& p) const {
+  p.eta = y.head(modes());
+  p.eta_dot = y.segment(modes(), modes());
+  p.x = coordinates(y);
+  p.x_dot = base_.Phi * p.eta_dot;
+}
+
+/// {v, w} of P per eta'.
+MatrixXd ModalEquations::jacobian(const VectorXd& y) const {
+  MatrixXd J = base_.Phi;
+  J.bottomRows<3>() = angleRateMap(coordinates(y).tail<3>()) * base_.Phi.bottomRows<3>();
+  return J;
+}
+
+RigidBody ModalEquations::lockedInP(const RidingRobot& robot) const {
+  return options_.hold_mass > 0 ? combine(RigidBody{}, robot.X_PL0, held_) : ves::lockedInP(robot);
+}
+
+/// (3.11): A, and what stands beside stiffness and damping on its right.
+void ModalEquations::split(const RidingRobot& robot, const VectorXd& y, MatrixXd& A,
+                           VectorXd& right) const {
+  const RigidBody locked = lockedInP(robot);
+  A = augmentedModalMass(base_, locked);
+  const auto Phi_u = base_.Phi.topRows<3>(), Phi_l = base_.Phi.bottomRows<3>();
+  const Mat3 Rx = skew(locked.p_BoBcm_B);
+  const Vec3 w = Phi_l * y.segment(modes(), modes());
+  const Vec3 centripetal = locked.mass * w.cross(Rx * w);
+  right += (Phi_u.transpose() + Phi_l.transpose() * Rx) * centripetal;
+  right += base_.Phi.transpose() * reaction(robot, ProperMotion{}).stacked();
+}
+
+void ModalEquations::whole(const RidingRobot& robot, const VectorXd& y, MatrixXd& A,
+                           VectorXd& right) const {
+  const BodyMotion P = platform(robot, y);
+  // The wrench is affine in the base's acceleration: this much without, the locked mass with it.
+  const Wrench F_Po_P = reaction(robot, properMotion(P, robot.X_PL0, Vec3::Zero()));
+  const MatrixXd J = jacobian(y);
+  right += J.transpose() * rotate(P.X.R, F_Po_P).stacked();
+  const Mat6 M_1 = spatialMass(rotated(P.X.R, ves::lockedInP(robot)));
+  A = MatrixXd::Identity(modes(), modes()) + J.transpose() * M_1 * J;
+}
+
+FreeBodyEquations::FreeBodyEquations(const FreeBodyModel& model, const Interaction& interaction,
+                                     const InteractionOptions&)
+    : model_(model),
+      p_IH_(interaction.p_IH),
+      start_(interaction.start),
+      mass_(model.body_P.mass + lockedRobot(interaction.payload, interaction.q0).mass) {}
+
+namespace {
+
+/// Of vehicle and robot, its joints locked, about Po in I.
+Mat6 massOf(const RigidBody& body_P, const RidingRobot& robot, const Mat3& R_IP) {
+  return spatialMass(
+      rotated(R_IP, combine(body_P, robot.X_PL0, compositeBody(robot.model, robot.q.q))));
+}
+
+/// Of the joints alone, about Po in I.
+Vec6 momentumOfJoints(const RidingRobot& robot, const Mat3& R_IP) {
+  const Wrench of_L0 = Wrench::from(jointMomentum(robot.model, robot.q.q, robot.q.q_dot));
+  return rotate(R_IP, transfer(robot.X_PL0, of_L0)).stacked();
+}
+
+Eigen::Quaterniond attitude(const VectorXd& y) {
+  return Eigen::Quaterniond(Eigen::Vector4d(y.segment<4>(kAttitude))).normalized();
+}
+
+}  // namespace
+
+VectorXd FreeBodyEquations::start(const RidingRobot& robot) const {
+  BodyMotion P;
+  P.X = {rotation(Vec3(start_.tail<3>())), p_IH_ + start_.head<3>()};
+  P.v = model_.v_IPo_I;
+  P.w = model_.w_IP_I;
+  return stateOf(robot, P);
+}
+
+/// Whatever the robot carries.
+VectorXd FreeBodyEquations::stateOf(const RidingRobot& robot, const BodyMotion& P) const {
+  const Vec3 p = P.X.p - p_IH_;
+  Vec6 momentum = massOf(model_.body_P, robot, P.X.R) * (Vec6() << P.v, P.w).finished() +
+                  momentumOfJoints(robot, P.X.R);
+  momentum.tail<3>() += p.cross(momentum.head<3>());  // about home
+  VectorXd y(kStates);
+  y << p, Eigen::Quaterniond(P.X.R).coeffs(), momentum / mass_;
+  return y;
+}
+
+BodyMotion FreeBodyEquations::platform(const RidingRobot& robot, const VectorXd& y) const {
+  BodyMotion P;
+  const Vec3 p = y.head<3>();
+  P.X = {attitude(y).toRotationMatrix(), p_IH_ + p};
+  Vec6 momentum = mass_ * y.segment<6>(kMomentum);
+  momentum.tail<3>() -= p.cross(momentum.head<3>());
+  momentum -= momentumOfJoints(robot, P.X.R);
+  const Vec6 V = massOf(model_.body_P, robot, P.X.R).llt().solve(momentum);
+  P.v = V.head<3>();
+  P.w = V.tail<3>();
+  return P;
+}
+
+void FreeBodyEquations::derivative(const RidingRobot& robot, const VectorXd& y,
+                                   const Wrench& F_Po_I, VectorXd& dy) const {
+  const BodyMotion P = platform(robot, y);
+  const Vec3 p = y.head<3>();
+  dy.head<3>() = P.v;
+  const Eigen::Quaterniond turn(0.0, 0.5 * P.w.x(), 0.5 * P.w.y(), 0.5 * P.w.z());
+  dy.segment<4>(kAttitude) = (turn * attitude(y)).coeffs();
+  dy.segment<6>(kMomentum) << F_Po_I.f / mass_, (F_Po_I.n + p.cross(F_Po_I.f)) / mass_;
+}
+
+void FreeBodyEquations::tell(const RidingRobot& robot, const VectorXd& y,
+                             InteractionPoint& point) const {
+  const BodyMotion P = platform(robot, y);
+  const Vec3 rpy = fixedAngles(P.X.R);
+  point.x << y.head<3>(), rpy;
+  point.x_dot << P.v, angleRateMap(rpy).inverse() * P.w;
+}
+
+VehicleEquations equationsOf(const Interaction& interaction, const InteractionOptions& options) {
+  return std::visit(
+      [&](const auto& model) -> VehicleEquations {
+        if constexpr (std::is_same_v<std::decay_t<decltype(model)>, ModalModel>)
+          return ModalEquations(model, interaction, options);
+        else
+          return FreeBodyEquations(model, interaction, options);
+      },
+      interaction.vehicle);
+}
+
+}  // namespace ves

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// The vehicle's part in the equations of motion of chapter 3, by kind.
+#pragma once
+
+#include <variant>
+
+#include "ves/srms/interaction.hpp"
+
+namespace ves {
+
+/// The robot that rides on it, at one time.
+struct RidingRobot {
+  const RobotModel& model;
+  const Transform& X_PL0;
+  JointState q;
+};
+
+/// y = {eta, eta'}.
+class ModalEquations {
+ public:
+  ModalEquations(const ModalModel& base, const Interaction& interaction,
+                 const InteractionOptions& options);
+
+  Eigen::Index size() const { return 2 * modes(); }
+  Eigen::VectorXd start(const RidingRobot& robot) const;
+  /// [-] of y's units that are a millimetre at the tip.
+  double milli() const { return 1e-3 / base_.Phi.cwiseAbs().maxCoeff(); }
+  /// The interval that begins now, `step` steps after the start.
+  void begin(const RidingRobot& robot, std::int64_t step);
+  /// Where P is, and how it moves.
+  BodyMotion platform(const RidingRobot& robot, const Eigen::VectorXd& y) const;
+  /// The robot has another load, while P moves as before.
+  void load(const RidingRobot&, const BodyMotion&, Eigen::VectorXd&) const {}
+  /// Under what touches or pushes the two, about Po in I.
+  void derivative(const RidingRobot& robot, const Eigen::VectorXd& y, const Wrench& F_Po_I,
+                  Eigen::VectorXd& dy) const;
+  void tell(const RidingRobot& robot, const Eigen::VectorXd& y, InteractionPoint& point) const;
+
+ private:
+  Eigen::Index modes() const { return base_.stiffness.size(); }
+  Vec6 coordinates(const Eigen::VectorXd& y) const { return rest_ + base_.Phi * y.head(modes()); }
+  Eigen::MatrixXd jacobian(const Eigen::VectorXd& y) const;
+  RigidBody lockedInP(const RidingRobot& robot) const;
+  void split(const RidingRobot& robot, const Eigen::VectorXd& y, Eigen::MatrixXd& A,
+             Eigen::VectorXd& right) const;
+  void whole(const RidingRobot& robot, const Eigen::VectorXd& y, Eigen::MatrixXd& A,
+             Eigen::VectorXd& right) const;
+
+  const ModalModel& base_;
+  const InteractionOptions& options_;
+  Vec3 p_IH_;
+  Eigen::VectorXd eta_;        // where it is let go
+  Vec6 rest_;                  // [m, rad] constant part of x, which the modes do not express
+  std::int64_t held_at_ = -1;  // [-] step that A was last computed for
+  RigidBody held_;
+};
+
+/// y = {p, q, P, L}: where P is from home, its attitude, and the momentum of all that floats, about
+/// home in I, over its mass at the start. Whatever the joints do, nothing but F_Po_I changes it.
+class FreeBodyEquations {
+ public:
+  FreeBodyEquations(const FreeBodyModel& model, const Interaction& interaction,
+                    const InteractionOptions&);
+
+  Eigen::Index size() const { return 13; }
+  Eigen::VectorXd start(const RidingRobot& robot) const;
+  double milli() const { return 1e-3; }
+  void begin(const RidingRobot&, std::int64_t) {}
+  BodyMotion platform(const RidingRobot& robot, const Eigen::VectorXd& y) const;
+  void load(const RidingRobot& robot, const BodyMotion& P, Eigen::VectorXd& y) const {
+    y.head(size()) = stateOf(robot, P);
+  }
+  void derivative(const RidingRobot& robot, const Eigen::VectorXd& y, const Wrench& F_Po_I,
+                  Eigen::VectorXd& dy) const;
+  void tell(const RidingRobot& robot, const Eigen::VectorXd& y, InteractionPoint& point) const;
+
+ private:
+  Eigen::VectorXd stateOf(const RidingRobot& robot, const BodyMotion& P) const;
+
+  const FreeBodyModel& model_;
+  Vec3 p_IH_;
+  Vec6 start_;
+  double mass_;  // [kg] at the start
+};
+
+using VehicleEquations = std::variant<ModalEquations, FreeBodyEquations>;
+VehicleEquations equationsOf(const Interaction& interaction, const InteractionOptions& options);
+
+}  // namespace ves

@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ves/vehicle/free_body.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "ves/math/dense.hpp"
+
+namespace ves {
+namespace {
+
+/// A spatial mass, with its basis turned.
+Mat6 turned(const Mat3& R_AB, const Mat6& M_B) noexcept {
+  Mat6 out;
+  for (int i = 0; i < 6; i += 3)
+    for (int j = 0; j < 6; j += 3)
+      out.block<3, 3>(i, j) =
+          R_AB.lazyProduct(M_B.block<3, 3>(i, j)).eval().lazyProduct(R_AB.transpose());
+  return out;
+}
+
+/// The body of a spatial mass.
+struct Lumped {
+  explicit Lumped(const Mat6& M) noexcept
+      : mass(M(0, 0)),
+        center(Vec3(M(5, 1), M(3, 2), M(4, 0)) / mass),
+        inertia(M.bottomRightCorner<3, 3>() + mass * skew(center) * skew(center)) {}
+
+  double mass;   // [kg]
+  Vec3 center;   // [m] from Po
+  Mat3 inertia;  // [kg m^2] about the centre
+};
+
+/// The rate of the rotation vector th of R = rotationOf(th) R_0 where R turns at w.
+Vec3 rotationRate(const Vec3& th, const Vec3& w) noexcept {
+  return w - 0.5 * th.cross(w) + th.cross(th.cross(w)) / 12.0;
+}
+
+/// [rad] the vector that rotationOf() takes to R.
+Vec3 rotationVector(const Mat3& R) noexcept {
+  const Eigen::Quaterniond q(R);
+  const double half = q.vec().norm(), angle = 2.0 * std::atan2(half, std::abs(q.w()));
+  const double per_half = half > 0.0 ? angle / half : 2.0;
+  return std::copysign(per_half, q.w()) * q.vec();
+}
+
+Vec6 velocity(const RigidState& s) noexcept { return (Vec6() << s.v, s.w).finished(); }
+
+/// The same with the acceleration under F.
+PathPoint<6> motionOf(const Mat6& M_P, const RigidState& s, const Wrench& F_Po_I) noexcept {
+  const Lumped body(M_P);
+  const Vec3 c = s.R_IP * body.center;
+  const Mat3 J = s.R_IP * body.inertia * s.R_IP.transpose();
+  const Vec3 alpha = J.inverse() * (F_Po_I.n - c.cross(F_Po_I.f) - s.w.cross(J * s.w));
+  const Vec3 a = F_Po_I.f / body.mass - alpha.cross(c) - s.w.cross(s.w.cross(c));
+  PathPoint<6> out;
+  const Vec3 rpy = fixedAngles(s.R_IP);
+  const Mat3 to_rates = angleRateMap(rpy).inverse();
+  const Vec3 rpy_dot = to_rates * s.w;
+  out.x << s.p, rpy;
+  out.x_dot << s.v, rpy_dot;
+  out.x_ddot << a, to_rates * (alpha - angleRateMapDerivative(rpy, rpy_dot) * rpy_dot);
+  return out;
+}
+
+}  // namespace
+
+ModalModel linearised(const FreeBodyModel& model) {
+  const Eigen::LLT<Mat6> llt(spatialMass(model.body_P));
+  ModalModel out;
+  out.Phi = llt.matrixU().solve(Mat6::Identity());  // Phi^T M Phi = 1
+  out.stiffness = Vec6::Zero();
+  out.damping = Mat6::Zero();
+  return out;
+}
+
+RigidState advanced(const Mat6& M_P, const Mat6& M_then_P, const RigidState& from, const Wrench& F,
+                    double dt) noexcept {
+  constexpr double kMostTurn = 0.005;  // [rad] in a step
+  constexpr double kMostSteps = 1e3;   // [-] a turn as fast as that is no vehicle's
+  if (dt == 0.0) return from;
+  const Lumped at_first(M_P), at_last(M_then_P);
+  const Vec3 c_first = from.R_IP * at_first.center, shift_P = at_last.center - at_first.center;
+  const Mat3 reshape = at_last.inertia - at_first.inertia;
+  const Vec3 v_c = from.v + from.w.cross(c_first), a_c = F.f / at_last.mass;
+  Vec3 L = from.R_IP * (at_first.inertia * (from.R_IP.transpose() * from.w));
+
+  const double turn =
+      std::abs(dt) * (from.w.norm() + std::abs(dt) * (F.n - c_first.cross(F.f)).norm() *
+                                          at_first.inertia.inverse().norm());
+  const int steps = static_cast<int>(std::min(kMostSteps, 1.0 + turn / kMostTurn));
+  const double h = dt / steps;
+  RigidState to = from;
+  Vec3 shifted = Vec3::Zero();  // [m] what the robot has moved the centre by, in I
+  for (int i = 0; i < steps; ++i) {
+    struct Rates {
+      Vec3 th, L, shifted;
+    };
+    const auto rates = [&](double part, const Vec3& th, const Vec3& momentum) -> Rates {
+      const double share = (i + part) / steps;
+      const Mat3 R = rotationOf(th) * to.R_IP;
+      const Mat3 mobility = (at_first.inertia + share * reshape).inverse();
+      const Vec3 w = R * (mobility * (R.transpose() * momentum)),
+                 c = R * (at_first.center + share * shift_P), c_dot = R * shift_P / dt;
+      return {rotationRate(th, w), F.n - c.cross(F.f) + at_last.mass * w.cross(c).cross(c_dot),
+              c_dot};
+    };
+    const Rates k1 = rates(0.0, Vec3::Zero(), L),
+                k2 = rates(0.5, 0.5 * h * k1.th, L + 0.5 * h * k1.L),
+                k3 = rates(0.5, 0.5 * h * k2.th, L + 0.5 * h * k2.L),
+                k4 = rates(1.0, h * k3.th, L + h * k3.L);
+    const auto mean = [h](const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) -> Vec3 {
+      return h / 6.0 * (a + 2.0 * b + 2.0 * c + d);
+    };
+    L += mean(k1.L, k2.L, k3.L, k4.L);
+    shifted += mean(k1.shifted, k2.shifted, k3.shifted, k4.shifted);
+    to.R_IP = rotationOf(mean(k1.th, k2.th, k3.th, k4.th)) * to.R_IP;
+  }
+  // Orthogonal to rounding, by a step of Newton's.
+  to.R_IP = 0.5 * to.R_IP * (3.0 * Mat3::Identity() - to.R_IP.transpose() * to.R_IP);
+  const Vec3 c_last = to.R_IP * at_last.center;
+  to.w = to.R_IP * (at_last.inertia.inverse() * (to.R_IP.transpose() * L));
+  to.v = v_c + dt * a_c - to.w.cross(c_last);
+  to.p = from.p + dt * (v_c + 0.5 * dt * a_c) + shifted - (c_last - c_first);
+  return to;
+}
+
+FreeBody::FreeBody(const FreeBodyModel& model, double period)
+    : model_(model),
+      M_P_(spatialMass(model.body_P)),
+      beside_({Mat6::Identity(), Vec6::Zero(), Mat6::Zero()}),
+      period_(period) {}
+
+void FreeBody::reset(const Vec6& x, const Mat6& M_1, double ahead) noexcept {
+  RigidState& s = now_.rigid;
+  s = {rotation(Vec3(x.tail<3>())), x.head<3>(), model_.v_IPo_I, model_.w_IP_I};
+  const Mat6 M_P = massInP() + turned(s.R_IP.transpose(), M_1);
+  now_.motion = motionOf(M_P, s, {});
+  now_.motion.x = x;
+  if (ahead > 0.0 && !velocity(s).isZero(0.0)) s = advanced(M_P, M_P, s, {}, -ahead);
+}
+
+void FreeBody::step(const Wrench& F_Po_I, double damping) noexcept {
+  step(F_Po_I, CarriedBody(Mat6::Zero()), period_, 0.0, damping);
+}
+
+void FreeBody::step(const Wrench& F_Po_I, const CarriedBody& carried, double dt, double ahead,
+                    double damping) noexcept {
+  before_ = now_;
+  dt_ = dt;
+  const RigidState& from = before_.rigid;
+  const Mat6 own = massInP(),
+             before = own + turned(carried.R_IP_before.transpose(), carried.before),
+             after = own + turned(carried.R_IP.transpose(), carried.M_1),
+             middle = turned(from.R_IP, 0.5 * (before + after));
+  mobility_ = middle.inverse();
+  damping_ = -damping * (middle * velocity(from));
+  const Wrench F = Wrench::from(F_Po_I.stacked() + damping_);
+  const RigidState s = advanced(before, after, from, F, dt);
+  way_ << s.p - from.p, rotationVector(s.R_IP * from.R_IP.transpose());
+  now_.rigid = s;
+  now_.motion = motionOf(after, advanced(after, after, s, F, ahead), F);
+  if (damped() < 0.0) {
+    now_ = before_;
+    step(F_Po_I, carried, dt, ahead, 0.0);
+  }
+}
+
+double FreeBody::kineticEnergy() const noexcept {
+  const RigidState& s = now_.rigid;
+  Vec6 V_P;
+  V_P << s.R_IP.transpose() * s.v, s.R_IP.transpose() * s.w;
+  return 0.5 * factors_.mass * V_P.dot(M_P_ * V_P);
+}
+
+ModalDynamics::Body FreeBody::body(const Mat6& M_1) const noexcept {
+  return beside_.body(turned(now_.rigid.R_IP, M_P_) + M_1 / factors_.mass - Mat6::Identity());
+}
+
+void FreeBody::displace(const ModalDynamics::Modes& by) noexcept {
+  const auto moved = [&](RigidState& s) {
+    s.p += by.eta.head<3>();
+    s.R_IP = rotationOf(by.eta.tail<3>()) * s.R_IP;
+    s.v += by.eta_dot.head<3>();
+    s.w += by.eta_dot.tail<3>();
+  };
+  moved(now_.rigid);
+  PathPoint<6>& m = now_.motion;  // which may be ahead
+  const Mat3 to_rates = angleRateMap(m.x.tail<3>()).inverse();
+  m.x.head<3>() += by.eta.head<3>();
+  m.x.tail<3>() += to_rates * by.eta.tail<3>();
+  m.x_dot.head<3>() += by.eta_dot.head<3>();
+  m.x_dot.tail<3>() += to_rates * by.eta_dot.tail<3>();
+}
+
+void FreeBody::slow(double share) noexcept {
+  RigidState &s = now_.rigid, from = before_.rigid;
+  s.p = from.p + share * (s.p - from.p);
+  s.R_IP = rotationOf(share * rotationVector(s.R_IP * from.R_IP.transpose())) * from.R_IP;
+  s.v *= share;
+  s.w *= share;
+  way_ *= share;
+  PathPoint<6>& motion = now_.motion;  // which may be ahead
+  motion.x = before_.motion.x + share * (motion.x - before_.motion.x);
+  motion.x_dot *= share;
+  motion.x_ddot = (motion.x_dot - before_.motion.x_dot) / period_;
+}
+
+}  // namespace ves
