@@ -205,9 +205,9 @@ Interaction afloat(const Experiment& e, double mass, double inertia) {
   Interaction i = interactionOf(e, duration);
   Vec6 share;
   share << Vec3::Constant(1.0 / std::sqrt(mass)), Vec3::Constant(1.0 / std::sqrt(inertia));
-  std::get<ModalModel>(i.vehicle).Phi = share.asDiagonal();
-  std::get<ModalModel>(i.vehicle).stiffness = Vec6::Zero();
-  std::get<ModalModel>(i.vehicle).damping = Mat6::Zero();
+  std::get<ModalModel>(i.vehicle.kind).Phi = share.asDiagonal();
+  std::get<ModalModel>(i.vehicle.kind).stiffness = Vec6::Zero();
+  std::get<ModalModel>(i.vehicle.kind).damping = Mat6::Zero();
   i.actions.clear();
   return i;
 }

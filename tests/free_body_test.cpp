@@ -266,12 +266,26 @@ TEST(FreeSpace, APlanarLinkTurnsItsBodyAsMomentumSays) {
     const auto center = [&](const InteractionPoint& p, double q) -> Vec3 {
       const Mat3 R = rotation(Vec3(p.x.tail<3>()));
       const Link& link = i.payload.robot.link(0);
-      const RigidBody& body = std::get<FreeBodyModel>(i.vehicle).body_P;
+      const RigidBody& body = std::get<FreeBodyModel>(i.vehicle.kind).body_P;
       const Vec3 of_link = link.X_parent.p + rotationOf(Vec3(0, 0, q)) * link.body.p_BoBcm_B;
       return p.x.head<3>() +
              R * (body.mass * body.p_BoBcm_B + link.body.mass * of_link) / (planar.m0 + planar.m1);
     };
     EXPECT_LT((center(points.back(), to) - center(points.front(), 0.0)).norm(), 1e-9) << to;
+  }
+}
+
+TEST(FreeSpace, WhatFliesGoesStraightAndDoesNotTurn) {
+  Interaction i = PlanarLink{}.interaction(0.7);
+  std::get<FreeBodyModel>(i.vehicle.kind).v_IPo_I = {0.2, -0.1, 0.3};
+  i.start << 1.0, -2.0, 0.5, 0.3, -0.2, 0.1;
+  InteractionOptions options;
+  options.duration = 100'000'000'000;
+  options.step = 1'000'000'000;
+  for (const InteractionPoint& p : simulate(i, options)) {
+    Vec6 should = i.start;
+    should.head<3>() += p.t * Vec3(0.2, -0.1, 0.3);
+    EXPECT_LT((p.x - should).norm(), 1e-9) << p.t;
   }
 }
 
@@ -354,7 +368,7 @@ TEST(FreeBody, FollowsARobotThatSwingsOnIt) {
   options.model = InteractionModel::kWhole;
   const std::vector<InteractionPoint> truth = simulate(i, options);
 
-  FreeBody body(std::get<FreeBodyModel>(i.vehicle), kTick);
+  FreeBody body(std::get<FreeBodyModel>(i.vehicle.kind), kTick);
   body.reset(Vec6::Zero());
   const auto attitude = [&](std::size_t n) { return rotation(Vec3(truth[n].x.tail<3>())); };
   const auto locked = [&](std::size_t n) {

@@ -121,7 +121,7 @@ TEST(Gate, LooksAtEveryPoseOfTheRobot) {
   const auto stable = [](double lighter, const std::string& robot) {
     Experiment e = test::experiment("doss_on_table_4_1",
                                     {"program=[{admittance: {duration_s: 5}" + robot + "}]"});
-    std::get<ModalModel>(e.controller.vehicle).Phi *= lighter;
+    std::get<ModalModel>(e.controller.vehicle.kind).Phi *= lighter;
     return isStable(e.controller, e.plant.task);
   };
   double lo = 1.0, hi = 100.0;

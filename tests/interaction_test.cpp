@@ -30,10 +30,10 @@ TEST(Interaction, AugmentedMassIsTheModalMassOfBaseAndRobot) {  // (3.11)
   const Interaction i = interaction("srms_deploy_puma", {"base.keep_modes=8"});
   const RigidBody robot = lockedInP(i, i.q0);
   const MatrixXd expected =
-      MatrixXd::Identity(8, 8) + std::get<ModalModel>(i.vehicle).Phi.transpose() *
-                                     spatialMass(robot) * std::get<ModalModel>(i.vehicle).Phi;
+      MatrixXd::Identity(8, 8) + std::get<ModalModel>(i.vehicle.kind).Phi.transpose() *
+                                     spatialMass(robot) * std::get<ModalModel>(i.vehicle.kind).Phi;
   EXPECT_LT(
-      (augmentedModalMass(std::get<ModalModel>(i.vehicle), robot) - expected).cwiseAbs().maxCoeff(),
+      (augmentedModalMass(std::get<ModalModel>(i.vehicle.kind), robot) - expected).cwiseAbs().maxCoeff(),
       1e-12);
 }
 
@@ -44,7 +44,7 @@ double energy(const Interaction& i, const InteractionPoint& p, const RigidBody& 
   const Mat6 M = spatialMass(rotated(P.X.R, robot_P));
   return 0.5 *
          (p.eta_dot.squaredNorm() +
-          std::get<ModalModel>(i.vehicle).stiffness.dot(p.eta.cwiseAbs2()) + twist.dot(M * twist));
+          std::get<ModalModel>(i.vehicle.kind).stiffness.dot(p.eta.cwiseAbs2()) + twist.dot(M * twist));
 }
 
 BodyMotion platform(const InteractionPoint& p) {
@@ -62,7 +62,7 @@ BodyMotion smallAngles(const InteractionPoint& p) {
 /// Undamped and let go from a large deflection: 0.1 rad, 0.2 m.
 Interaction letGo(InteractionOptions& options) {
   Interaction i = interaction("srms_unberth_doss", {"base.keep_modes=6"});
-  std::get<ModalModel>(i.vehicle).damping.setZero();
+  std::get<ModalModel>(i.vehicle.kind).damping.setZero();
   i.actions.clear();
   options.duration = 10'000'000'000;
   options.tolerance = 1e-11;
@@ -96,7 +96,7 @@ TEST(Interaction, SplitGainsTheWorkOfItsCentripetalTermAndNoMore) {
   const std::vector<InteractionPoint> points = simulate(i, options);
   const RigidBody robot = lockedInP(i, i.q0);
   const auto power = [&](const InteractionPoint& p) {
-    const Vec6 twist = std::get<ModalModel>(i.vehicle).Phi * p.eta_dot;
+    const Vec6 twist = std::get<ModalModel>(i.vehicle.kind).Phi * p.eta_dot;
     const Vec3 w = twist.tail<3>();
     return robot.mass * twist.head<3>().dot(w.cross(robot.p_BoBcm_B.cross(w)));
   };
@@ -116,8 +116,8 @@ TEST(Interaction, SplitAndWholeBeginAlikeUnderAPointMass) {
   // gyroscopic moment, which (3.11) leaves out; its centripetal force acts at its own place. (About
   // several axes at once the angles' rates differ from the angular velocity in the second order.)
   Interaction i = interaction("srms_unberth_doss", {"base.keep_modes=6"});
-  std::get<ModalModel>(i.vehicle).stiffness.setZero();
-  std::get<ModalModel>(i.vehicle).damping.setZero();
+  std::get<ModalModel>(i.vehicle.kind).stiffness.setZero();
+  std::get<ModalModel>(i.vehicle.kind).damping.setZero();
   i.actions.clear();
   for (Link& link : i.payload.robot.links) link.body = {};
   i.payload.top_plate_S = i.payload.adapter_R = {};
@@ -128,7 +128,7 @@ TEST(Interaction, SplitAndWholeBeginAlikeUnderAPointMass) {
   options.eta = VectorXd::Zero(6);
   for (const Vec6& twist :
        {Vec6(0.4 * Vec6::Unit(3)), Vec6(-0.3 * Vec6::Unit(4)), Vec6(0.5 * Vec6::Unit(5))}) {
-    options.eta_dot = leastSquares(std::get<ModalModel>(i.vehicle).Phi, twist);
+    options.eta_dot = leastSquares(std::get<ModalModel>(i.vehicle.kind).Phi, twist);
     options.model = InteractionModel::kSplit;
     const Vec6 split = simulate(i, options).back().x_dot - twist;
     options.model = InteractionModel::kWhole;
@@ -144,15 +144,15 @@ TEST(Interaction, SmallMotionIsTheMatrixExponential) {
   InteractionOptions options;
   Interaction i = letGo(options);
   options.eta *= 1e-6;
-  std::get<ModalModel>(i.vehicle).damping =
-      (0.04 * std::get<ModalModel>(i.vehicle).stiffness.cwiseSqrt()).asDiagonal();
+  std::get<ModalModel>(i.vehicle.kind).damping =
+      (0.04 * std::get<ModalModel>(i.vehicle.kind).stiffness.cwiseSqrt()).asDiagonal();
   const std::vector<InteractionPoint> points = simulate(i, options);
-  const MatrixXd A = augmentedModalMass(std::get<ModalModel>(i.vehicle), lockedInP(i, i.q0));
+  const MatrixXd A = augmentedModalMass(std::get<ModalModel>(i.vehicle.kind), lockedInP(i, i.q0));
   MatrixXd S = MatrixXd::Zero(12, 12);
   S.topRightCorner(6, 6).setIdentity();
   S.bottomLeftCorner(6, 6) =
-      -solvePositive(A, std::get<ModalModel>(i.vehicle).stiffness.asDiagonal());
-  S.bottomRightCorner(6, 6) = -solvePositive(A, std::get<ModalModel>(i.vehicle).damping);
+      -solvePositive(A, std::get<ModalModel>(i.vehicle.kind).stiffness.asDiagonal());
+  S.bottomRightCorner(6, 6) = -solvePositive(A, std::get<ModalModel>(i.vehicle.kind).damping);
   for (const std::size_t k : {1u, 100u, 500u, 1000u}) {
     VectorXd start = VectorXd::Zero(12);
     start.head(6) = options.eta;
@@ -166,13 +166,13 @@ TEST(Interaction, MomentumOfAFreeBaseAndItsRobotStaysZero) {
   // about z. Its energy is of its angles' rates, so that it is the same base after a turn about z,
   // and after no other (Noether).
   Interaction i = interaction("srms_unberth_doss");
-  std::get<ModalModel>(i.vehicle).Phi = MatrixXd::Zero(6, 6);
+  std::get<ModalModel>(i.vehicle.kind).Phi = MatrixXd::Zero(6, 6);
   const double mass = 300.0;
   const Vec3 inertia(40.0, 60.0, 50.0);
-  std::get<ModalModel>(i.vehicle).Phi.diagonal() << Vec3::Constant(1.0 / std::sqrt(mass)),
+  std::get<ModalModel>(i.vehicle.kind).Phi.diagonal() << Vec3::Constant(1.0 / std::sqrt(mass)),
       inertia.cwiseSqrt().cwiseInverse();
-  std::get<ModalModel>(i.vehicle).stiffness = VectorXd::Zero(6);
-  std::get<ModalModel>(i.vehicle).damping = MatrixXd::Zero(6, 6);
+  std::get<ModalModel>(i.vehicle.kind).stiffness = VectorXd::Zero(6);
+  std::get<ModalModel>(i.vehicle.kind).damping = MatrixXd::Zero(6, 6);
   const RobotMove first{2, -0.3, 2.0}, second{0, 0.8, 2.0};
   i.actions = {{0, first}, {500'000'000, second}};
   InteractionOptions options;
@@ -199,7 +199,7 @@ TEST(Interaction, MomentumOfAFreeBaseAndItsRobotStaysZero) {
   double most_linear = 0.0, most_angular = 0.0;
   for (double t = 0.1; t < 2.5; t += 0.1) {
     const InteractionPoint& p = points[index(t)];
-    const Vec6 twist = std::get<ModalModel>(i.vehicle).Phi * p.eta_dot;
+    const Vec6 twist = std::get<ModalModel>(i.vehicle.kind).Phi * p.eta_dot;
     const Vec3 P_base = mass * twist.head<3>();
     const double H_base = inertia.z() * twist(5) + p.x.head<3>().cross(P_base).z();
     const Vec6 of_robot = test::momentum(robot, X_IL0, q, t, 1e-3);
@@ -217,7 +217,7 @@ TEST(Interaction, SplitIsWrongByTheOrderOfTheBasesMobility) {
   // is a product of that motion with the robot's, so relative to the motion it is a hundredth too.
   const auto error = [](double heavier) {
     Interaction i = interaction("srms_capture_doss", {"base.keep_modes=4"});
-    std::get<ModalModel>(i.vehicle).Phi /= std::sqrt(heavier);
+    std::get<ModalModel>(i.vehicle.kind).Phi /= std::sqrt(heavier);
     InteractionOptions options;
     options.tolerance = 1e-12;
     const std::vector<InteractionPoint> split = simulate(i, options);
@@ -259,7 +259,7 @@ TEST(Interaction, KeepingTheMassForNStepsErrsInProportionToN) {  // the report's
 
 TEST(Interaction, SaysWhenTheToleranceCannotBeKept) {
   Interaction i = interaction("srms_unberth_doss");
-  std::get<ModalModel>(i.vehicle).stiffness.setConstant(NAN);
+  std::get<ModalModel>(i.vehicle.kind).stiffness.setConstant(NAN);
   EXPECT_THROW(simulate(i, {}), std::domain_error);
 }
 

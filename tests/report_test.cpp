@@ -123,7 +123,7 @@ TEST(VesOnTheArm, IsSrmsRobotLateByTheSensorWhenTheArmHardlyGives) {
                        {"gravity_m_per_s2=0", "sensor.noise=false",
                         "program=[{move: {}}, {calibration: {}}, {admittance: {duration_s: 6}, "
                         "robot: [{at_s: 0, duration_s: 1, joint: joint_3, to_deg_or_m: -20}]}]"});
-  std::get<ModalModel>(e.controller.vehicle).Phi /= 8.0;
+  std::get<ModalModel>(e.controller.vehicle.kind).Phi /= 8.0;
   InteractionOptions options;
   const Interaction i = interactionOf(e, options.duration);
   options.step = 1'000'000;

@@ -243,6 +243,13 @@ Base readFree(Section& s) {
   return out;
 }
 
+/// Nothing between the robot and what moves under it.
+Base readRigid(Section&) {
+  Base out;
+  out.vehicle = ModalModel{Eigen::MatrixXd(6, 0), {}, {}};
+  return out;
+}
+
 /// A kind of base, by the key that says so.
 struct BaseKind {
   std::string_view key;
@@ -252,7 +259,8 @@ constexpr BaseKind kBases[] = {{"arm", readArmBase},
                                {"free", readFree},
                                {"modes", readModes},
                                {"mass", readMatrices},
-                               {"mass_diagonal", readMatrices}};
+                               {"mass_diagonal", readMatrices},
+                               {"ground", readRigid}};
 
 }  // namespace
 
@@ -264,7 +272,12 @@ Base readBase(Section s) {
     for (const BaseKind& one : kBases) keys.push_back(one.key);
     s.fail("mass", fmt::format("missing, want one of {}", fmt::join(keys, ", ")));
   }
-  const Base out = kind->read(s);
+  Base out = kind->read(s);
+  if (s.has("ground")) {
+    if (kind->key == "free")
+      s.fail("ground", "the vehicle floats, want a ground under modes, an arm, or alone");
+    out.vehicle.ground = readGround(s.section("ground"));
+  }
   s.finish();
   return out;
 }

@@ -190,7 +190,13 @@ void merge(Value& base, Value over) {
 
 Value load(const std::filesystem::path& path, const std::string& asked_by, int depth);
 
-/// Replaces `from` and `urdf` below by what they name.
+/// Files that are taken in as text, and the key that has it then.
+struct Embedded {
+  std::string_view key, text_key;
+};
+constexpr Embedded kEmbedded[] = {{"urdf", "urdf_text"}, {"recording", "recording_text"}};
+
+/// Replaces `from` and those of kEmbedded below by what they name.
 void resolve(Value& value, const std::filesystem::path& directory, int depth) {
   for (Value& child : value.children) resolve(child, directory, depth);
   if (value.kind != Value::Kind::kMap) return;
@@ -200,15 +206,17 @@ void resolve(Value& value, const std::filesystem::path& directory, int depth) {
     if (depth >= kMaxDepth) throw InputError(at + "files name each other in a circle");
     return at;
   };
-  if (Value* urdf = value.find("urdf")) {
-    const std::string at = named(*urdf, "urdf");
-    const std::filesystem::path path = directory / urdf->text;
-    const auto i = static_cast<std::size_t>(urdf - value.children.data());
-    urdf->text = readFile(path, at);
-    requireText(urdf->text, path.lexically_normal().string());
-    urdf->file = std::make_shared<const std::string>(path.lexically_normal().string());
-    urdf->line = 1;
-    value.keys[i] = "urdf_text";
+  for (const auto& [key, text_key] : kEmbedded) {
+    Value* embedded = value.find(key);
+    if (!embedded) continue;
+    const std::string at = named(*embedded, key);
+    const std::filesystem::path path = directory / embedded->text;
+    const auto i = static_cast<std::size_t>(embedded - value.children.data());
+    embedded->text = readFile(path, at);
+    requireText(embedded->text, path.lexically_normal().string());
+    embedded->file = std::make_shared<const std::string>(path.lexically_normal().string());
+    embedded->line = 1;
+    value.keys[i] = text_key;
   }
   if (const Value* from = value.find("from")) {
     const std::string at = named(*from, "from");
@@ -314,10 +322,13 @@ Value parseDocument(const std::string& text, const std::string& name) {
   return value;
 }
 
-/// What `from` and `urdf` name is a path, whatever YAML would make of its letters.
+/// What `from`, `urdf` and their like name is a path, whatever YAML would make of its letters.
 static bool isFileOf(const std::string& key, const std::string& given) {
   std::error_code error;
-  return (key == "from" || key == "urdf") && std::filesystem::is_regular_file(given, error);
+  const bool names_one =
+      key == "from" || std::any_of(std::begin(kEmbedded), std::end(kEmbedded),
+                                   [&](const Embedded& one) { return key == one.key; });
+  return names_one && std::filesystem::is_regular_file(given, error);
 }
 
 static Value scalar(const std::string& text, const std::string& name) {

@@ -241,12 +241,16 @@ KeyMeaning keyMeanings(const std::filesystem::path& config) {
     example.finish();
     askKeys(document, asked);
   }
-  // The URDF itself stands in the document, where the file named it.
-  if (auto text = asked.keys["robot"].keys.extract("urdf_text"); !text.empty()) {
-    text.key() = "urdf";
+  // A file itself stands in the document, where the key named it.
+  const auto named = [](auto& keys, const char* text_key, const char* key) {
+    auto text = keys.extract(text_key);
+    if (text.empty()) return;
+    text.key() = key;
     text.mapped().example.clear();
-    asked.keys["robot"].keys.insert(std::move(text));
-  }
+    keys.insert(std::move(text));
+  };
+  named(asked.keys["robot"].keys, "urdf_text", "urdf");
+  named(asked.keys["base"].keys["ground"].keys, "recording_text", "recording");
   const Value standard = loadDocument(config / "ves.yaml");
   const Value* const said = file.find("keys");
   if (!said) root.fail("keys", "missing");

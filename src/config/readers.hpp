@@ -62,6 +62,9 @@ Sensor readSensor(Section s);
 /// environment; the robot, the platform and gravity are there already
 World readEnvironment(Section s, const Experiment& e);
 
+/// base.ground
+GroundMotion readGround(Section s);
+
 /// safety.translation_m and rotation_deg, and what they ask of the legs
 WorkspaceUse readWorkspace(Section s, const Geometry& geometry);
 /// safety

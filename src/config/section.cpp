@@ -118,6 +118,8 @@ std::string Section::text(std::string_view key) {
   return value.text;
 }
 
+std::string Section::fileOf(std::string_view key) { return *need(key).file; }
+
 std::vector<std::string> Section::texts(std::string_view key) {
   if (AskedKey* const k = asked(key)) k->kinds |= AskedKey::kTexts;
   const Value& value = need(key);

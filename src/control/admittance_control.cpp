@@ -29,6 +29,7 @@ void AdmittanceControl::begin(const Vec6& x, const Mat6& M_1, double age, double
   change_.finish(model_);
   model_.reset(x, M_1, inertia_ ? age + share * wrench_delay_ : 0.0);
   begins_ = true;
+  shaken_ = 0.0;
   oscillation_.reset();
   port_.reset();
   energy_.reset();
@@ -69,7 +70,8 @@ const PathPoint<6>& AdmittanceControl::step(const AdmittanceInput& in, const Vec
                  port_.take(in.at_port, in.wrench.time, in.X_IP, in.servo));
     const SafetyLimits& limits = checks.limits();
     const bool held = scale_ < 1.0 && model_.kineticEnergy() > limits.growth_floor;
-    oscillation_.take(limits, model_.energy(), held, in.q, joint_moves_, period_);
+    shaken_ += model_.shaken();
+    oscillation_.take(limits, model_.energy() - shaken_, held, in.q, joint_moves_, period_);
   }
   return model_.motion();
 }

@@ -32,6 +32,7 @@ Eigen::VectorXd symmetricEigenvalues(const MatrixXd& A) {
 }
 
 SymmetricEigen symmetricEigen(const MatrixXd& A) {
+  if (A.size() == 0) return {};
   const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(A);
   return {solver.eigenvalues(), solver.eigenvectors()};
 }
@@ -39,6 +40,7 @@ SymmetricEigen symmetricEigen(const MatrixXd& A) {
 MatrixXd exponential(const MatrixXd& A) { return A.exp(); }
 
 MatrixXd leastSquares(const MatrixXd& A, const MatrixXd& B) {
+  if (A.cols() == 0) return MatrixXd(0, B.cols());
   return A.completeOrthogonalDecomposition().solve(B);
 }
 

@@ -44,7 +44,7 @@ class Equations {
 
   VectorXd start() const {
     VectorXd y(static_cast<Eigen::Index>(size()));
-    y.head(ofVehicle()) = each([&](const auto& v) { return v.start(riding(robot_.at(0))); });
+    y.head(ofVehicle()) = each([&](const auto& v) { return v.start(riding(robot_.at(0), 0.0)); });
     if (interaction_.world) {
       const std::optional<Target>& target = interaction_.world->environment.target;
       const Floating f = target ? target->start : Floating{};
@@ -56,7 +56,7 @@ class Equations {
   /// The interval that begins now, `step` steps after the start.
   void begin(std::int64_t now, std::int64_t step) {
     now_ = now;
-    std::visit([&](auto& v) { v.begin(riding(robot_.at(now_)), step); }, vehicle_);
+    std::visit([&](auto& v) { v.begin(riding(robot_.at(now_), seconds(now_)), step); }, vehicle_);
   }
   void begin(const RobotAction& action, VectorXd& y) {
     if (const auto* push = std::get_if<Push>(&action)) {
@@ -66,8 +66,8 @@ class Equations {
     if (std::holds_alternative<GraspTarget>(action)) {
       Floating target = floating(y);
       const JointState q = robot_.at(now_);
-      if (interaction_.world &&
-          grasp(interaction_.world->environment, toolMotion(q, platform(q, y)), target))
+      if (interaction_.world && grasp(interaction_.world->environment,
+                                      toolMotion(q, platform(q, seconds(now_), y)), target))
         X_TB_ = target.X_TB;
     } else if (std::holds_alternative<Release>(action) && X_TB_) {
       X_TB_.reset();
@@ -75,9 +75,9 @@ class Equations {
       const bool loads =
           std::holds_alternative<Grasp>(action) || std::holds_alternative<Release>(action);
       const JointState q = robot_.at(now_);
-      const BodyMotion P = platform(q, y);
+      const BodyMotion P = platform(q, seconds(now_), y);
       robot_.begin(action, now_);
-      if (loads) each([&](const auto& v) { v.load(riding(q), P, y); });
+      if (loads) each([&](const auto& v) { v.load(riding(q, seconds(now_)), P, y); });
     }
   }
 
@@ -88,9 +88,10 @@ class Equations {
 
   void derivative(double later, const VectorXd& y, VectorXd& dy) const {
     const JointState q = robot_.at(now_, later);
+    const double t = seconds(now_) + later;
     Wrench F_Po_I, on_target_Bo_I;  // beside the robot's
     if (pushing()) {
-      const BodyMotion P = platform(q, y);
+      const BodyMotion P = platform(q, t, y);
       const Push& push = push_->push;
       const Transform X_IB = interaction_.world ? floating(y).X_IB() : Transform();
       const Vec3 at = pushedPoint(push, P.X, X_PL0_, robot_.model(), q.q, X_IB);
@@ -100,7 +101,7 @@ class Equations {
         F_Po_I = {push.force_I, (at - P.X.p).cross(push.force_I)};
     }
     if (interaction_.world) {
-      const BodyMotion P = platform(q, y);
+      const BodyMotion P = platform(q, t, y);
       const FrameMotion tool = toolMotion(q, P);
       const Touch touched = touch(interaction_.world->environment, tool, floating(y));
       F_Po_I = F_Po_I + shift(touched.on_tool_To_I, P.X.p - tool.X.p);
@@ -108,17 +109,18 @@ class Equations {
                                     touched.on_target_Bo_I + on_target_Bo_I);
       dy.tail<kFloating>() << f.p, f.q, f.v, f.w;
     }
-    each([&](const auto& v) { v.derivative(riding(q), y, F_Po_I, dy); });
+    each([&](const auto& v) { v.derivative(riding(q, t), y, F_Po_I, dy); });
   }
 
   InteractionPoint point(std::int64_t now, const VectorXd& y) const {
     InteractionPoint p;
-    p.t = static_cast<double>(now) * kSecondPerNanosecond;
+    p.t = seconds(now);
     const JointState q = robot_.at(now);
-    each([&](const auto& v) { v.tell(riding(q), y, p); });
+    each([&](const auto& v) { v.tell(riding(q, p.t), y, p); });
     if (interaction_.world) {
       p.target = floating(y);
-      p.touch = touch(interaction_.world->environment, toolMotion(q, platform(q, y)), p.target);
+      p.touch =
+          touch(interaction_.world->environment, toolMotion(q, platform(q, p.t, y)), p.target);
       p.contacts = contacts_;
     }
     return p;
@@ -127,12 +129,13 @@ class Equations {
   /// What touches, `later` [s] in the interval.
   Touch touched(double later, const VectorXd& y) const {
     const JointState q = robot_.at(now_, later);
-    return touch(interaction_.world->environment, toolMotion(q, platform(q, y)), floating(y));
+    return touch(interaction_.world->environment,
+                 toolMotion(q, platform(q, seconds(now_) + later, y)), floating(y));
   }
   const Contact& contact() const { return contacts_.last(); }
   bool hasWorld() const { return interaction_.world.has_value(); }
   void see(double later, const VectorXd& y) {
-    contacts_.see(static_cast<double>(now_) * kSecondPerNanosecond + later, touched(later, y));
+    contacts_.see(seconds(now_) + later, touched(later, y));
   }
 
  private:
@@ -141,9 +144,10 @@ class Equations {
   Eigen::Index ofVehicle() const {
     return each([](const auto& v) { return v.size(); });
   }
-  RidingRobot riding(const JointState& q) const { return {robot_.model(), X_PL0_, q}; }
-  BodyMotion platform(const JointState& q, const VectorXd& y) const {
-    return each([&](const auto& v) { return v.platform(riding(q), y); });
+  static double seconds(std::int64_t ns) { return static_cast<double>(ns) * kSecondPerNanosecond; }
+  RidingRobot riding(const JointState& q, double t) const { return {robot_.model(), X_PL0_, q, t}; }
+  BodyMotion platform(const JointState& q, double t, const VectorXd& y) const {
+    return each([&](const auto& v) { return v.platform(riding(q, t), y); });
   }
 
   bool pushing() const { return push_ && now_ < push_->end(); }

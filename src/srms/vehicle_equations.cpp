@@ -31,16 +31,19 @@ RigidBody lockedInP(const RidingRobot& robot) {
 ModalEquations::ModalEquations(const ModalModel& base, const Interaction& interaction,
                                const InteractionOptions& options)
     : base_(base),
+      ground_(interaction.vehicle.ground),
       options_(options),
       p_IH_(interaction.p_IH),
-      eta_(leastSquares(base.Phi, interaction.start)),
-      rest_(interaction.start - base.Phi * eta_) {}
+      eta_(leastSquares(base.Phi, interaction.start - ground_.at(0.0).x)),
+      rest_(interaction.start - ground_.at(0.0).x - base.Phi * eta_) {}
 
 VectorXd ModalEquations::start(const RidingRobot&) const {
   VectorXd y = VectorXd::Zero(size());
   y.head(modes()) = eta_;
   if (options_.eta.size()) y.head(modes()) += options_.eta;
-  if (options_.eta_dot.size()) y.tail(modes()) = options_.eta_dot;
+  if (ground_.moves())
+    y.segment(modes(), modes()) = -leastSquares(base_.Phi, ground_.at(0.0).x_dot);
+  if (options_.eta_dot.size()) y.segment(modes(), modes()) += options_.eta_dot;
   return y;
 }
 
@@ -50,14 +53,20 @@ void ModalEquations::begin(const RidingRobot& robot, std::int64_t step) {
   held_ = compositeBody(robot.model, robot.q.q);
 }
 
-BodyMotion ModalEquations::platform(const RidingRobot&, const VectorXd& y) const {
-  const Vec6 x_dot = base_.Phi * y.segment(modes(), modes());
-  return bodyMotion(p_IH_, Pose::from(coordinates(y)), x_dot, Vec6::Zero());
+/// Its accelerations but for those of the modes.
+BodyMotion ModalEquations::platform(const RidingRobot& robot, const VectorXd& y) const {
+  const PathPoint<6> ground = ground_.at(robot.t);
+  const Vec6 x_dot = base_.Phi * y.segment(modes(), modes()) + ground.x_dot;
+  return bodyMotion(p_IH_, Pose::from(coordinates(y, ground)), x_dot, ground.x_ddot);
 }
 
 void ModalEquations::derivative(const RidingRobot& robot, const VectorXd& y, const Wrench& F_Po_I,
                                 VectorXd& dy) const {
   const Eigen::Index k = modes();
+  if (k == 0) {
+    dy.head(size()).setZero();
+    return;
+  }
   const auto eta = y.head(k), eta_dot = y.segment(k, k);
   dy.head(k) = eta_dot;
   VectorXd right = -base_.stiffness.cwiseProduct(eta) - base_.damping * eta_dot;
@@ -66,21 +75,24 @@ void ModalEquations::derivative(const RidingRobot& robot, const VectorXd& y, con
     split(robot, y, A, right);
   else
     whole(robot, y, A, right);
-  right += jacobian(y).transpose() * F_Po_I.stacked();
+  const PathPoint<6> ground = ground_.at(robot.t);
+  right += jacobian(y, ground).transpose() * F_Po_I.stacked();
+  if (ground_.moves()) right -= leastSquares(base_.Phi, ground.x_ddot);
   dy.segment(k, k) = solvePositive(A, right);
 }
 
-void ModalEquations::tell(const RidingRobot&, const VectorXd& y, InteractionPoint& p) const {
+void ModalEquations::tell(const RidingRobot& robot, const VectorXd& y, InteractionPoint& p) const {
+  const PathPoint<6> ground = ground_.at(robot.t);
   p.eta = y.head(modes());
   p.eta_dot = y.segment(modes(), modes());
-  p.x = coordinates(y);
-  p.x_dot = base_.Phi * p.eta_dot;
+  p.x = coordinates(y, ground);
+  p.x_dot = base_.Phi * p.eta_dot + ground.x_dot;
 }
 
 /// {v, w} of P per eta'.
-MatrixXd ModalEquations::jacobian(const VectorXd& y) const {
+MatrixXd ModalEquations::jacobian(const VectorXd& y, const PathPoint<6>& ground) const {
   MatrixXd J = base_.Phi;
-  J.bottomRows<3>() = angleRateMap(coordinates(y).tail<3>()) * base_.Phi.bottomRows<3>();
+  J.bottomRows<3>() = angleRateMap(coordinates(y, ground).tail<3>()) * base_.Phi.bottomRows<3>();
   return J;
 }
 
@@ -95,10 +107,12 @@ void ModalEquations::split(const RidingRobot& robot, const VectorXd& y, MatrixXd
   A = augmentedModalMass(base_, locked);
   const auto Phi_u = base_.Phi.topRows<3>(), Phi_l = base_.Phi.bottomRows<3>();
   const Mat3 Rx = skew(locked.p_BoBcm_B);
-  const Vec3 w = Phi_l * y.segment(modes(), modes());
+  const PathPoint<6> ground = ground_.at(robot.t);
+  const Vec3 w = Phi_l * y.segment(modes(), modes()) + ground.x_dot.tail<3>();
   const Vec3 centripetal = locked.mass * w.cross(Rx * w);
   right += (Phi_u.transpose() + Phi_l.transpose() * Rx) * centripetal;
   right += base_.Phi.transpose() * reaction(robot, ProperMotion{}).stacked();
+  if (ground_.moves()) right -= base_.Phi.transpose() * spatialMass(locked) * ground.x_ddot;
 }
 
 void ModalEquations::whole(const RidingRobot& robot, const VectorXd& y, MatrixXd& A,
@@ -106,7 +120,7 @@ void ModalEquations::whole(const RidingRobot& robot, const VectorXd& y, MatrixXd
   const BodyMotion P = platform(robot, y);
   // The wrench is affine in the base's acceleration: this much without, the locked mass with it.
   const Wrench F_Po_P = reaction(robot, properMotion(P, robot.X_PL0, Vec3::Zero()));
-  const MatrixXd J = jacobian(y);
+  const MatrixXd J = jacobian(y, ground_.at(robot.t));
   right += J.transpose() * rotate(P.X.R, F_Po_P).stacked();
   const Mat6 M_1 = spatialMass(rotated(P.X.R, ves::lockedInP(robot)));
   A = MatrixXd::Identity(modes(), modes()) + J.transpose() * M_1 * J;
@@ -197,7 +211,7 @@ VehicleEquations equationsOf(const Interaction& interaction, const InteractionOp
         else
           return FreeBodyEquations(model, interaction, options);
       },
-      interaction.vehicle);
+      interaction.vehicle.kind);
 }
 
 }  // namespace ves

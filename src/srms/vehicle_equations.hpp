@@ -3,6 +3,7 @@
 // The vehicle's part in the equations of motion of chapter 3, by kind.
 #pragma once
 
+#include <algorithm>
 #include <variant>
 
 #include "ves/srms/interaction.hpp"
@@ -14,18 +15,19 @@ struct RidingRobot {
   const RobotModel& model;
   const Transform& X_PL0;
   JointState q;
+  double t = 0.0;  // [s] since they were let go
 };
 
-/// y = {eta, eta'}.
+/// y = {eta, eta'}; without modes one number that stays.
 class ModalEquations {
  public:
   ModalEquations(const ModalModel& base, const Interaction& interaction,
                  const InteractionOptions& options);
 
-  Eigen::Index size() const { return 2 * modes(); }
+  Eigen::Index size() const { return std::max<Eigen::Index>(1, 2 * modes()); }
   Eigen::VectorXd start(const RidingRobot& robot) const;
   /// [-] of y's units that are a millimetre at the tip.
-  double milli() const { return 1e-3 / base_.Phi.cwiseAbs().maxCoeff(); }
+  double milli() const { return modes() > 0 ? 1e-3 / base_.Phi.cwiseAbs().maxCoeff() : 1e-3; }
   /// The interval that begins now, `step` steps after the start.
   void begin(const RidingRobot& robot, std::int64_t step);
   /// Where P is, and how it moves.
@@ -39,8 +41,10 @@ class ModalEquations {
 
  private:
   Eigen::Index modes() const { return base_.stiffness.size(); }
-  Vec6 coordinates(const Eigen::VectorXd& y) const { return rest_ + base_.Phi * y.head(modes()); }
-  Eigen::MatrixXd jacobian(const Eigen::VectorXd& y) const;
+  Vec6 coordinates(const Eigen::VectorXd& y, const PathPoint<6>& ground) const {
+    return rest_ + base_.Phi * y.head(modes()) + ground.x;
+  }
+  Eigen::MatrixXd jacobian(const Eigen::VectorXd& y, const PathPoint<6>& ground) const;
   RigidBody lockedInP(const RidingRobot& robot) const;
   void split(const RidingRobot& robot, const Eigen::VectorXd& y, Eigen::MatrixXd& A,
              Eigen::VectorXd& right) const;
@@ -48,6 +52,7 @@ class ModalEquations {
              Eigen::VectorXd& right) const;
 
   const ModalModel& base_;
+  const GroundMotion& ground_;
   const InteractionOptions& options_;
   Vec3 p_IH_;
   Eigen::VectorXd eta_;        // where it is let go

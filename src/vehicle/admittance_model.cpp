@@ -4,15 +4,16 @@
 namespace ves {
 
 ModalModel linearised(const VehicleModel& model) {
-  if (const auto* modes = std::get_if<ModalModel>(&model)) return *modes;
-  return linearised(std::get<FreeBodyModel>(model));
+  if (const auto* modes = std::get_if<ModalModel>(&model.kind)) return *modes;
+  return linearised(std::get<FreeBodyModel>(model.kind));
 }
 
 AdmittanceModel::AdmittanceModel(const VehicleModel& model, double period)
     : kind_([&] {
-        if (const auto* free = std::get_if<FreeBodyModel>(&model))
+        if (const auto* free = std::get_if<FreeBodyModel>(&model.kind))
           return Kinds(std::in_place_type<FreeBody>, *free, period);
-        return Kinds(std::in_place_type<ModalVehicle>, std::get<ModalModel>(model), period);
+        return Kinds(std::in_place_type<ModalVehicle>, std::get<ModalModel>(model.kind), period,
+                     model.ground);
       }()) {}
 
 }  // namespace ves

@@ -197,15 +197,17 @@ ModalDynamics::Modes ModalDynamics::advance(const Body& body, double dt, const M
   return sum;
 }
 
-ModalVehicle::ModalVehicle(const ModalModel& model, double period)
+ModalVehicle::ModalVehicle(const ModalModel& model, double period, const GroundMotion& ground)
     : nominal_(model),
       dynamics_(nominal_),
       Phi_pinv_(leastSquares(model.Phi, Mat6::Identity())),
+      ground_(ground),
       period_(period),
       step_(dynamics_.hold(period)) {
   now_.modes = dynamics_.atRest();
   before_ = now_;
   damping_.setZero(dynamics_.size());
+  drag_.setZero(dynamics_.size());
 }
 
 void ModalVehicle::become(const VehicleFactors& factors) noexcept {
@@ -227,6 +229,13 @@ void ModalVehicle::reset(const Vec6& x, const Mat6& M_1, double ahead) noexcept 
   modes.eta.noalias() = Phi_pinv_ * x;
   modes.eta_dot.setZero();
   offset_ = x;
+  if (ground_.moves()) {
+    now_.time = ahead > 0.0 ? -ahead : 0.0;
+    now_.ground = ground_.at(now_.time);
+    modes.eta.noalias() -= Phi_pinv_ * now_.ground.x;
+    modes.eta_dot.noalias() -= Phi_pinv_ * now_.ground.x_dot;
+    offset_ -= now_.ground.x;
+  }
   offset_.noalias() -= Phi * modes.eta;
   now_.motion = {};
   now_.motion.x = x;
@@ -247,12 +256,21 @@ void ModalVehicle::step(const Wrench& F_Po_I, double damping) noexcept {
   u /= factors_.mass;
   damping_ = -damping * before_.modes.eta_dot;
   u += damping_;
+  ModalDynamics::Forces then;  // of the ground as it is at the end
+  if (ground_.moves()) {
+    now_.time += period_;
+    now_.ground = ground_.at(now_.time);
+    drag_ = dragAt((now_.ground.x_dot - before_.ground.x_dot) / period_, Mat6::Zero());
+    then = dragAt(now_.ground.x_ddot, Mat6::Zero()) - drag_;
+    u += drag_;
+  }
   // The coupled transition of another vehicle would be computed on the heap.
   const bool by_series = dynamics_.coupled() && factors_ != VehicleFactors();
   now_.modes = by_series
                    ? dynamics_.advance(dynamics_.body(Mat6::Zero()), period_, before_.modes, u)
                    : dynamics_.advance(step_, before_.modes, u);
-  now_.motion = at(now_.modes, dynamics_.acceleration(now_.modes, u));
+  if (ground_.moves()) u += then;
+  now_.motion = at(now_.modes, dynamics_.acceleration(now_.modes, u), now_.ground);
   if (damped() < 0.0) {
     now_ = before_;
     step(F_Po_I, 0.0);
@@ -264,11 +282,15 @@ void ModalVehicle::step(const Wrench& F_Po_I, const CarriedBody& carried, double
   before_ = now_;
   // What the body's momentum loses by another shape or attitude goes to base and body. The moment
   // of a body that slides is not in it: r' x v is no torque about a point that slides along.
-  Vec6 lost = carried.before.rightCols<3>() * (E_ * angleRates(before_.modes));
+  Vec6 lost = carried.before.rightCols<3>() * (E_ * angleRates(before_));
   Modes middle = before_.modes;
   middle.eta += 0.5 * dt * middle.eta_dot;
-  E_ = angleRateMap(coordinates(middle).tail<3>());
-  lost -= carried.M_1.rightCols<3>() * (E_ * angleRates(before_.modes));
+  if (ground_.moves()) {
+    now_.time += dt;
+    now_.ground = ground_.at(now_.time);
+  }
+  E_ = angleRateMap(coordinates(middle, now_.ground).tail<3>());
+  lost -= carried.M_1.rightCols<3>() * (E_ * angleRates(before_));
   const Mat6 M_1_per_mass = working(carried.M_1) / factors_.mass;
   const ModalDynamics::Body body = dynamics_.body(M_1_per_mass);
   dt_ = dt;
@@ -283,23 +305,47 @@ void ModalVehicle::step(const Wrench& F_Po_I, const CarriedBody& carried, double
   damping_ = -damping * before_.modes.eta_dot;
   damping_.noalias() -= damping * dynamics_.Phi().transpose() * momentum;
   u += damping_;
+  PathPoint<6> then = now_.ground;
+  ModalDynamics::Forces u_then = u;
+  if (ground_.moves()) {
+    const auto mean = [&](const PathPoint<6>& from, const PathPoint<6>& to, double over) {
+      return dragAt(over > 0.0 ? Vec6((to.x_dot - from.x_dot) / over) : to.x_ddot, M_1_per_mass);
+    };
+    then = ground_.at(now_.time + ahead);
+    drag_ = mean(before_.ground, now_.ground, dt);
+    u_then += mean(now_.ground, then, ahead);
+    u += drag_;
+  }
   now_.modes = dynamics_.advance(body, dt, before_.modes, u);
-  const Modes later = dynamics_.advance(body, ahead, now_.modes, u);
-  now_.motion = at(later, dynamics_.acceleration(body, later, u));
+  const Modes later = dynamics_.advance(body, ahead, now_.modes, u_then);
+  if (ground_.moves()) u_then = u - drag_ + dragAt(then.x_ddot, M_1_per_mass);
+  now_.motion = at(later, dynamics_.acceleration(body, later, u_then), then);
   if (damped() < 0.0) {
     now_ = before_;
     step(F_Po_I, carried.M_1, dt, ahead, 0.0);
   }
 }
 
-Vec6 ModalVehicle::coordinates(const Modes& modes) const noexcept {
+Vec6 ModalVehicle::coordinates(const Modes& modes, const PathPoint<6>& ground) const noexcept {
   Vec6 x = offset_;
   x.noalias() += dynamics_.Phi() * modes.eta;
+  if (ground_.moves()) x += ground.x;
   return x;
 }
 
-Vec3 ModalVehicle::angleRates(const Modes& modes) const noexcept {
-  return dynamics_.Phi().bottomRows<3>() * modes.eta_dot;
+Vec3 ModalVehicle::angleRates(const State& state) const noexcept {
+  Vec3 rates = dynamics_.Phi().bottomRows<3>() * state.modes.eta_dot;
+  if (ground_.moves()) rates += state.ground.x_dot.tail<3>();
+  return rates;
+}
+
+ModalDynamics::Forces ModalVehicle::dragAt(const Vec6& g_ddot,
+                                           const Mat6& M_1_per_mass) const noexcept {
+  ModalDynamics::Forces out;
+  out.noalias() = -(Phi_pinv_ * g_ddot);
+  const Vec6 of_body = M_1_per_mass * g_ddot;
+  out.noalias() -= dynamics_.Phi().transpose() * of_body;
+  return out;
 }
 
 Mat6 ModalVehicle::working(const Mat6& M_1) const noexcept {
@@ -310,12 +356,17 @@ Mat6 ModalVehicle::working(const Mat6& M_1) const noexcept {
 }
 
 PathPoint<6> ModalVehicle::at(const Modes& modes,
-                              const ModalDynamics::Vector<kMaxModes>& acceleration) const noexcept {
+                              const ModalDynamics::Vector<kMaxModes>& acceleration,
+                              const PathPoint<6>& ground) const noexcept {
   const auto& Phi = dynamics_.Phi();
   PathPoint<6> out;
-  out.x = coordinates(modes);
+  out.x = coordinates(modes, ground);
   out.x_dot.noalias() = Phi * modes.eta_dot;
   out.x_ddot.noalias() = Phi * acceleration;
+  if (ground_.moves()) {
+    out.x_dot += ground.x_dot;
+    out.x_ddot += ground.x_ddot;
+  }
   return out;
 }
 
@@ -332,6 +383,10 @@ void ModalVehicle::slow(double share) noexcept {
   PathPoint<6>& motion = now_.motion;  // which may be ahead of the modes
   modes.eta = before_.modes.eta + share * (modes.eta - before_.modes.eta);
   modes.eta_dot *= share;
+  if (ground_.moves()) {  // which waits
+    now_.time = before_.time + share * (now_.time - before_.time);
+    now_.ground = ground_.at(now_.time);
+  }
   motion.x = before_.motion.x + share * (motion.x - before_.motion.x);
   motion.x_dot *= share;
   motion.x_ddot = (motion.x_dot - before_.motion.x_dot) / period_;

@@ -54,6 +54,9 @@ constexpr Scenario kScenarios[] = {
     {"srms_low_hover_doss", true, true},
     {"contact_board_puma", true, true},
     {"contact_capture_puma", true, true},
+    {"satellite_puma", true, false},
+    {"ship_arm", true, false},
+    {"deck_puma", true, false},
 };
 
 std::vector<std::string> drawSettings(Dice& dice, const Scenario& scenario) {
@@ -70,6 +73,7 @@ std::vector<std::string> drawSettings(Dice& dice, const Scenario& scenario) {
     const bool observer = dice.chance(0.7), inertia = observer && dice.chance(0.7);
     put(c + "observer", observer ? "true" : "false");
     put(c + "inertia", inertia ? "true" : "false");
+    put(c + "wrench", "raw");
     if (observer) maybe(0.3, c + "adaptation", "true");
     if (inertia && dice.chance(0.4)) {
       put(c + "wrench", "aided");

@@ -20,7 +20,8 @@ struct Base {
 };
 
 /// One of four: `mass`, `damping`, `stiffness` (6 x 6); `modes`, a table from elsewhere; `arm`, a
-/// chain of beams; `free`, a body that floats. Throws InputError.
+/// chain of beams; `free`, a body that floats. All but the last may stand on a `ground` that moves,
+/// and that may be all. Throws InputError.
 Base readBase(Section section);
 
 /// A file of config/bases; `overrides` are "key.path=value". Throws InputError.

@@ -88,6 +88,8 @@ class Section {
   std::int64_t integer(std::string_view key, std::int64_t lo, std::int64_t hi);
   bool flag(std::string_view key);
   std::string text(std::string_view key);
+  /// The file that a text is from.
+  std::string fileOf(std::string_view key);
   /// A list of texts, which may be empty.
   std::vector<std::string> texts(std::string_view key);
   std::string choice(std::string_view key, const std::vector<std::string_view>& allowed);

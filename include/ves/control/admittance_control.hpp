@@ -67,6 +67,7 @@ class AdmittanceControl {
   double wrench_delay_;   // [s]
   bool begins_ = true;    // the first step: what was before it does not count
   Oscillation oscillation_;
+  double shaken_ = 0.0;  // [J] by the ground so far
   PortWork port_;
   EnergyAccount energy_;
   VehicleChange change_;

@@ -13,7 +13,16 @@
 namespace ves {
 
 /// What is emulated.
-using VehicleModel = std::variant<ModalModel, FreeBodyModel>;
+struct VehicleModel {
+  VehicleModel() = default;
+  VehicleModel(const ModalModel& model) : kind(model) {}
+  VehicleModel(const FreeBodyModel& model) : kind(model) {}
+
+  std::variant<ModalModel, FreeBodyModel> kind;
+  GroundMotion ground;  // that it stands on; a body that floats stands on none
+
+  bool operator==(const VehicleModel&) const = default;
+};
 
 /// Its modes about home: what can be said of it before it moves far.
 ModalModel linearised(const VehicleModel& model);
@@ -97,6 +106,10 @@ class AdmittanceModel {
   /// [J] that the vehicle's own damping took in it.
   double dissipated() const noexcept {
     return each([](const auto& v) { return v.dissipated(); });
+  }
+  /// [J] that the ground put into energy() in it.
+  double shaken() const noexcept {
+    return each([](const auto& v) { return v.shaken(); });
   }
   /// [J] that a step takes on average of noise in F_Po_I, of this covariance: of the speed that a
   /// wrench leads to in a step, the next steps have all, this one half.

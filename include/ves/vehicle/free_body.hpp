@@ -70,6 +70,7 @@ class FreeBody {
     return 0.5 * dt_ * dt_ * covariance.cwiseProduct(mobility_).sum();
   }
   double damped() const noexcept { return -damping_.dot(way_); }
+  double shaken() const noexcept { return 0.0; }
 
   const PathPoint<6>& motion() const noexcept { return now_.motion; }
 

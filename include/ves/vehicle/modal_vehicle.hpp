@@ -5,7 +5,7 @@
 
 #include "ves/contract/order.hpp"
 #include "ves/math/frames.hpp"
-#include "ves/math/quintic.hpp"
+#include "ves/vehicle/ground_motion.hpp"
 
 namespace ves {
 
@@ -137,10 +137,14 @@ struct CarriedBody {
 ///
 /// Its mass m, damping c and stiffness k may be changed, all modes alike: m eta'' + c C eta' + k K
 /// eta = Phi^T W.
+///
+/// On a ground that moves by g, x = Phi eta + g: springs and dampers pull at what is beside it, and
+/// vehicle and body have to be accelerated with it. Without modes the vehicle goes as the ground
+/// does.
 class ModalVehicle {
  public:
   /// Discretises for the period [s].
-  ModalVehicle(const ModalModel& model, double period);
+  ModalVehicle(const ModalModel& model, double period, const GroundMotion& ground = {});
 
   /// motion() is at rest at x. What the modes cannot express of x stays as a constant offset. Where
   /// motion() is predicted `ahead` [s] of the modes, these are propagated back by `ahead` along the
@@ -185,7 +189,13 @@ class ModalVehicle {
 
   /// [J] that the last step took of F_Po_I, and that its damping took.
   double taken(const Wrench& F_Po_I) const noexcept {
-    return working(F_Po_I).dot(dynamics_.Phi() * (now_.modes.eta - before_.modes.eta));
+    Vec6 way = dynamics_.Phi() * (now_.modes.eta - before_.modes.eta);
+    if (ground_.moves()) way += now_.ground.x - before_.ground.x;
+    return working(F_Po_I).dot(way);
+  }
+  /// [J] that the ground put into energy() in it.
+  double shaken() const noexcept {
+    return ground_.moves() ? factors_.mass * drag_.dot(now_.modes.eta - before_.modes.eta) : 0.0;
   }
   /// [J] that the base's own damping took in it, the speed taken as a line.
   double dissipated() const noexcept {
@@ -220,28 +230,34 @@ class ModalVehicle {
   struct State {
     Modes modes;
     PathPoint<6> motion;
+    double time = 0.0;  // [s] of the ground, and where that is
+    PathPoint<6> ground;
   };
 
-  Vec6 coordinates(const Modes& modes) const noexcept;
-  Vec3 angleRates(const Modes& modes) const noexcept;  // [rad/s]
+  Vec6 coordinates(const Modes& modes, const PathPoint<6>& ground) const noexcept;
+  Vec3 angleRates(const State& state) const noexcept;  // [rad/s]
+  /// Of an acceleration of the ground, with the body M_1 per mass, on the coordinates.
+  ModalDynamics::Forces dragAt(const Vec6& g_ddot, const Mat6& M_1_per_mass) const noexcept;
   /// On the coordinates, stacked.
   Vec6 working(const Wrench& F_Po_I) const noexcept {
     return (Vec6() << F_Po_I.f, E_.transpose() * F_Po_I.n).finished();
   }
   Mat6 working(const Mat6& M_1) const noexcept;
-  PathPoint<6> at(const Modes& modes,
-                  const ModalDynamics::Vector<kMaxModes>& acceleration) const noexcept;
+  PathPoint<6> at(const Modes& modes, const ModalDynamics::Vector<kMaxModes>& acceleration,
+                  const PathPoint<6>& ground) const noexcept;
 
   ModalDynamics nominal_;  // as configured
   ModalDynamics dynamics_;
   VehicleFactors factors_;
   Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::RowMajor, kMaxModes, 6> Phi_pinv_;
+  GroundMotion ground_;
   double period_ = 0.0;           // [s]
   double dt_ = 0.0;               // [s] of the last step
   Mat6 mobility_ = Mat6::Zero();  // [1/kg] in it: acceleration per wrench, per mass
   Hold step_;
   State now_, before_;             // before the last step
   ModalDynamics::Forces damping_;  // in the last step, per mass
+  ModalDynamics::Forces drag_;     // of the ground in it, per mass
   Mat3 E_ = Mat3::Identity();      // angleRateMap amid the last step; none without a body
   Vec6 offset_ = Vec6::Zero();
 };
