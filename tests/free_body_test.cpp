@@ -10,6 +10,7 @@
 
 #include "support/momentum.hpp"
 #include "support/rig.hpp"
+#include "ves/kinematics/stewart.hpp"
 #include "ves/math/dense.hpp"
 #include "ves/robot/momentum.hpp"
 #include "ves/srms/interaction.hpp"
@@ -390,6 +391,48 @@ TEST(FreeBody, FollowsARobotThatSwingsOnIt) {
   EXPECT_GT(turned, 0.02);
   EXPECT_LT(apart, 2e-6);
   EXPECT_LT(farthest, 2e-6);
+}
+
+TEST(FreeSpace, WhatIsGraspedGoesAlongAndTurnsWithIt) {
+  // A ball that drifts and tumbles, and a servicer with its arm: one body after the grip has come
+  // to rest, with the momentum that the ball brought.
+  std::int64_t duration = 0;
+  const Experiment e = test::experiment("servicer_capture");
+  Interaction i = interactionOf(e, duration);
+  std::erase_if(i.actions, [](const TimedAction& one) {
+    return !std::holds_alternative<GraspTarget>(one.action);
+  });
+  ASSERT_EQ(i.actions.size(), 1U);
+  InteractionOptions options;
+  options.model = InteractionModel::kWhole;
+  options.duration = duration;
+  options.tolerance = 1e-11;
+  const std::vector<InteractionPoint> points = simulate(i, options);
+
+  const RigidBody all_P = combine(std::get<FreeBodyModel>(i.vehicle.kind).body_P, Transform(),
+                                  lockedRobot(i.payload, i.q0));
+  const Target& target = *i.world->environment.target;
+  const auto momentum = [&](const InteractionPoint& p) -> Vec6 {  // about the origin of I
+    const BodyMotion P = bodyMotion(i.p_IH, Pose::from(p.x), p.x_dot, Vec6::Zero());
+    const Vec6 of_Po = spatialMass(rotated(P.X.R, all_P)) * (Vec6() << P.v, P.w).finished();
+    const Mat3 R_IB = p.target.q.toRotationMatrix();
+    const Vec3 linear = target.mass * p.target.v,
+               angular = R_IB * (target.I_Bcm_B * (R_IB.transpose() * p.target.w));
+    Vec6 sum;
+    sum << of_Po.head<3>() + linear,
+        of_Po.tail<3>() + P.X.p.cross(Vec3(of_Po.head<3>())) + angular + p.target.p.cross(linear);
+    return sum;
+  };
+  const Vec6 first = momentum(points.front());
+  EXPECT_NEAR(first.head<3>().norm(), 100.0 * 0.02, 1e-12);
+  for (std::size_t n = 0; n < points.size(); n += 10)
+    EXPECT_LT((momentum(points[n]) - first).norm(), 1e-9) << points[n].t;
+  const InteractionPoint& last = points.back();
+  ASSERT_TRUE(last.target.X_TB);
+  const BodyMotion P = bodyMotion(i.p_IH, Pose::from(last.x), last.x_dot, Vec6::Zero());
+  EXPECT_LT((last.target.w - P.w).norm(), 1e-6);
+  EXPECT_LT((last.target.v - P.v - P.w.cross(last.target.p - P.X.p)).norm(), 1e-6);
+  EXPECT_GT(P.w.norm(), 1e-3);
 }
 
 }  // namespace
