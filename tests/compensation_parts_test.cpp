@@ -759,5 +759,29 @@ TEST(ServoObserver, AReadingsTimeMayBeWrongByItsJitter) {
   EXPECT_LT((observer.length() - now - 0.02 * slack).cwiseAbs().maxCoeff(), 0.005 * slack(0));
 }
 
+TEST(AdmittanceModel, TakesAChangeOfTheRobotOnceWhereNoSampleComes) {
+  // The body shrinks while it turns; the ticks after it have no new sample.
+  ModalModel m;
+  m.Phi = Mat6::Identity() / 10.0;
+  m.stiffness = Vec6::Constant(4.0);
+  m.damping = Mat6::Zero();
+  FreeBodyModel body;
+  body.body_P = {80.0, {0.1, 0.0, -0.5}, Vec3(10.0, 20.0, 25.0).asDiagonal()};
+  const Mat6 large = spatialMass({50.0, {0.1, 0.0, 0.9}, Vec3(8.0, 8.0, 2.0).asDiagonal()}),
+             small = spatialMass({50.0, {0.1, 0.0, 0.3}, Vec3(4.0, 4.0, 2.0).asDiagonal()});
+  for (const VehicleModel& vehicle : {VehicleModel(m), VehicleModel(body)}) {
+    AdmittanceModel model(vehicle, 0.01);
+    model.reset(Vec6::Zero());
+    for (int n = 0; n < 100; ++n) model.step({{5.0, 3.0, 0.0}, {3.0, 2.0, 4.0}}, large, 0.01, 0.0);
+    model.step({}, {large, small}, 0.01, 0.0);
+    const PathPoint<6> once = model.motion();
+    for (int n = 0; n < 3; ++n) model.step({}, {large, small}, 0.0, 0.0);
+    EXPECT_GT(once.x_dot.tail<3>().norm(), 0.01);
+    // Where the fixed angles are taken moves on by half a tick.
+    EXPECT_LT((model.motion().x_dot - once.x_dot).norm(), 1e-6);
+    EXPECT_LT((model.motion().x - once.x).norm(), 1e-12);
+  }
+}
+
 }  // namespace
 }  // namespace ves

@@ -435,5 +435,106 @@ TEST(FreeSpace, WhatIsGraspedGoesAlongAndTurnsWithIt) {
   EXPECT_GT(P.w.norm(), 1e-3);
 }
 
+// --- With thrusters ------------------------------------------------------------------------------
+
+/// Both ways to a motion, without a robot: the model's steps and free space.
+struct BothWays {
+  std::vector<Vec6> model, truth;  // [m, rad] x, a point a tick
+
+  BothWays(const FreeBodyModel& vehicle, double duration) {
+    Interaction i;
+    i.vehicle = vehicle;
+    InteractionOptions options;
+    options.duration = std::llround(duration * 1e9);
+    options.tolerance = 1e-11;
+    for (const InteractionPoint& p : simulate(i, options)) truth.push_back(p.x);
+    FreeBody body(vehicle, kTick);
+    body.reset(Vec6::Zero());
+    model.push_back(body.motion().x);
+    while (model.size() < truth.size()) {
+      body.step(Wrench{});
+      model.push_back(body.motion().x);
+    }
+  }
+};
+
+TEST(Thrusters, PushAsLongAsTheyFire) {
+  // Through the centre of mass, and a couple: half a tick more or less counts as that.
+  FreeBodyModel vehicle = asymmetric({0.0, 0.0, -0.5});
+  Propulsion& jets = vehicle.propulsion;
+  jets.size = 3;
+  jets.thrusters[0].p_PoT_P = {1.0, 0.0, -0.5};
+  jets.thrusters[0].force_P = {4.0, 0.0, 0.0};
+  jets.thrusters[0].firings[0] = {1.003, 2.5};
+  jets.thrusters[0].size = 1;
+  for (std::size_t k : {1u, 2u}) {
+    const double side = k == 1 ? 1.0 : -1.0;
+    jets.thrusters[k].p_PoT_P = {0.0, side * 0.6, -0.5};
+    jets.thrusters[k].force_P = {-side * 0.5, 0.0, 0.0};  // n = 0.6 N m about z
+    jets.thrusters[k].firings[0] = {4.0, 4.2};
+    jets.thrusters[k].firings[1] = {5.0, 5.105};
+    jets.thrusters[k].size = 2;
+  }
+  const BothWays both(vehicle, 10.0);
+  const auto way = [](double from, double until, double rate, double t) {
+    const double on = std::clamp(t - from, 0.0, until - from);
+    return rate * (0.5 * on * on + on * std::max(0.0, t - until));
+  };
+  for (const auto* x : {&both.model, &both.truth})
+    for (std::size_t n = 0; n < x->size(); n += 7) {
+      const double t = static_cast<double>(n) * kTick;
+      // A mean over a tick: the impulse is exact, its moment to half a tick.
+      const double slack = 1e-9 + 4.0 / 80.0 * kTick * kTick + 0.6 / 25.0 * kTick * kTick;
+      EXPECT_NEAR((*x)[n](0), way(1.003, 2.5, 4.0 / 80.0, t), slack) << t;
+      EXPECT_NEAR((*x)[n](5), way(4.0, 4.2, 0.6 / 25.0, t) + way(5.0, 5.105, 0.6 / 25.0, t), slack)
+          << t;
+    }
+}
+
+TEST(Thrusters, ADeadBandHasItsLimitCycle) {
+  // Pulses of d_omega that turn +d_omega / 2 round at the band's edges: a period of 8 th / d_omega.
+  for (int axis = 0; axis < 3; ++axis) {
+    FreeBodyModel vehicle;
+    vehicle.body_P = {80.0, Vec3::Zero(), Vec3(10.0, 20.0, 25.0).asDiagonal()};
+    AttitudeHold& hold = vehicle.propulsion.hold;
+    hold.dead_band = 0.02;
+    hold.pulse = 0.03;
+    const double step = 0.002;  // [rad/s]
+    hold.torque_P = step / hold.pulse * vehicle.body_P.I_Bcm_B.diagonal();
+    vehicle.w_IP_I(axis) = 0.5 * step;
+    const BothWays both(vehicle, 500.0);
+    for (const auto* x : {&both.model, &both.truth}) {
+      std::vector<double> up;  // [s] where it comes through zero
+      double most = 0.0;
+      for (std::size_t n = 0; n + 1 < x->size(); ++n) {
+        const double a = (*x)[n](3 + axis), b = (*x)[n + 1](3 + axis);
+        most = std::max(most, std::abs(a));
+        if (n > 0 && a < 0.0 && b >= 0.0)
+          up.push_back(kTick * (static_cast<double>(n) + a / (a - b)));
+      }
+      ASSERT_GT(up.size(), 5U);
+      const double period = (up.back() - up.front()) / static_cast<double>(up.size() - 1);
+      EXPECT_NEAR(period, 8.0 * hold.dead_band / step, 1e-3 * period) << axis;
+      EXPECT_NEAR(most, hold.dead_band, 1e-3 * hold.dead_band) << axis;
+    }
+  }
+}
+
+TEST(Thrusters, KeepTheModelWhereTheyKeepTheTruth) {
+  // A tumbling body, all axes at once, its pulses decided by each for itself.
+  FreeBodyModel vehicle = asymmetric({0.1, 0.0, -0.5});
+  vehicle.w_IP_I = {0.01, -0.02, 0.015};
+  vehicle.propulsion.hold = {0.03, 0.1, {3.0, 3.0, 3.0}};
+  const BothWays both(vehicle, 60.0);
+  double most = 0.0, apart = 0.0;
+  for (std::size_t n = 0; n < both.truth.size(); ++n) {
+    most = std::max(most, both.truth[n].tail<3>().norm());
+    apart = std::max(apart, (both.truth[n] - both.model[n]).norm());
+  }
+  EXPECT_GT(most, 0.03);
+  EXPECT_LT(most, 0.08);
+  EXPECT_LT(apart, 1e-4);
+}
+
 }  // namespace
 }  // namespace ves

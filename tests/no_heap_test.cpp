@@ -158,7 +158,7 @@ TEST(NoHeapOverTheBus, InThePeriodicPathsOfBothProcesses) {
 
 INSTANTIATE_TEST_SUITE_P(Scenarios, NoHeap,
                          testing::Values("puma_on_table_4_1", "free_decay", "ramp", "alpha_sine",
-                                         "satellite_puma", "ship_arm", "deck_puma"),
+                                         "satellite_hold", "ship_arm", "deck_puma"),
                          [](const auto& test) { return std::string(test.param); });
 
 }  // namespace

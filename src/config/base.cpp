@@ -212,6 +212,44 @@ Base readArmBase(Section& s) {
   return out;
 }
 
+Thruster readThruster(Section s) {
+  constexpr double kLongest = 1e5;  // [s]
+  Thruster out;
+  out.p_PoT_P = s.vector("at_m", 3, -100.0, 100.0);
+  out.force_P = s.vector("force_n", 3, -1e5, 1e5);
+  if (!(out.force_P.norm() > 0.0)) s.fail("force_n", "no force, want a direction of it");
+  const double least = s.has("least_on_s") ? s.number("least_on_s", 0.0, 100.0) : 0.0;
+  if (s.has("firings_s")) {
+    const Eigen::MatrixXd rows = s.matrix("firings_s", -1, 2, 0.0, kLongest);
+    if (rows.rows() > Thruster::kMostFirings)
+      s.fail("firings_s",
+             fmt::format("{} of them, want at most {}", rows.rows(), Thruster::kMostFirings));
+    for (Eigen::Index i = 0; i < rows.rows(); ++i) {
+      const Firing one{rows(i, 0), rows(i, 1)};
+      if (!(one.until > one.from) || (i > 0 && !(one.from >= rows(i - 1, 1))))
+        s.fail("firings_s", fmt::format("[{}, {}], want each to end after it begins, and to begin "
+                                        "after the one before",
+                                        one.from, one.until));
+      if (!(one.until - one.from >= least - 1e-9))
+        s.fail("firings_s", fmt::format("[{}, {}] is shorter than least_on_s of {}", one.from,
+                                        one.until, least));
+      out.firings[static_cast<std::size_t>(out.size++)] = one;
+    }
+  }
+  s.finish();
+  return out;
+}
+
+AttitudeHold readHold(Section s) {
+  AttitudeHold out;
+  out.dead_band = s.number("dead_band_deg", 0.001, 45.0) * kDegree;
+  out.pulse = s.number("pulse_s", 0.001, 10.0);
+  out.torque_P = s.vector("torque_nm", 3, 0.0, 1e5);
+  if (!(out.torque_P.maxCoeff() > 0.0)) s.fail("torque_nm", "none, want one about some axis");
+  s.finish();
+  return out;
+}
+
 /// A body that floats.
 Base readFree(Section& s) {
   FreeBodyModel free;
@@ -220,6 +258,15 @@ Base readFree(Section& s) {
     free.v_IPo_I = section.vector("velocity_m_per_s", 3, -1.0, 1.0);
   if (section.has("rate_deg_per_s"))
     free.w_IP_I = kDegree * section.vector("rate_deg_per_s", 3, -90.0, 90.0);
+  if (section.has("thrusters"))
+    for (Section one : section.list("thrusters")) {
+      if (free.propulsion.size == Thruster::kMost)
+        section.fail("thrusters", fmt::format("more than {}", Thruster::kMost));
+      free.propulsion.thrusters[static_cast<std::size_t>(free.propulsion.size++)] =
+          readThruster(one);
+    }
+  if (section.has("attitude_hold"))
+    free.propulsion.hold = readHold(section.section("attitude_hold"));
   std::optional<Vec3> about;  // [m] of P
   if (section.has("inertia_about_m")) about = section.vector("inertia_about_m", 3, -100.0, 100.0);
   RigidBody& body = free.body_P = readBody(section);

@@ -54,9 +54,10 @@ class Equations {
   }
 
   /// The interval that begins now, `step` steps after the start.
-  void begin(std::int64_t now, std::int64_t step) {
+  void begin(std::int64_t now, std::int64_t step, const VectorXd& y) {
     now_ = now;
-    std::visit([&](auto& v) { v.begin(riding(robot_.at(now_), seconds(now_)), step); }, vehicle_);
+    std::visit([&](auto& v) { v.begin(riding(robot_.at(now_), seconds(now_)), step, y); },
+               vehicle_);
   }
   void begin(const RobotAction& action, VectorXd& y) {
     if (const auto* push = std::get_if<Push>(&action)) {
@@ -262,7 +263,7 @@ std::vector<InteractionPoint> simulate(const Interaction& interaction,
     out.push_back(equations.point(now, y));
     const std::int64_t end = (step + 1) * options.step;
     while (now < end) {
-      equations.begin(now, step);
+      equations.begin(now, step, y);
       for (; next != interaction.actions.end() && next->start <= now; ++next)
         equations.begin(next->action, y);
       std::int64_t until = end;

@@ -47,7 +47,7 @@ VectorXd ModalEquations::start(const RidingRobot&) const {
   return y;
 }
 
-void ModalEquations::begin(const RidingRobot& robot, std::int64_t step) {
+void ModalEquations::begin(const RidingRobot& robot, std::int64_t step, const VectorXd&) {
   if (options_.hold_mass == 0 || step % options_.hold_mass != 0 || step == held_at_) return;
   held_at_ = step;
   held_ = compositeBody(robot.model, robot.q.q);
@@ -127,11 +127,12 @@ void ModalEquations::whole(const RidingRobot& robot, const VectorXd& y, MatrixXd
 }
 
 FreeBodyEquations::FreeBodyEquations(const FreeBodyModel& model, const Interaction& interaction,
-                                     const InteractionOptions&)
+                                     const InteractionOptions& options)
     : model_(model),
       p_IH_(interaction.p_IH),
       start_(interaction.start),
-      mass_(model.body_P.mass + lockedRobot(interaction.payload, interaction.q0).mass) {}
+      mass_(model.body_P.mass + lockedRobot(interaction.payload, interaction.q0).mass),
+      step_(static_cast<double>(options.step) * kSecondPerNanosecond) {}
 
 namespace {
 
@@ -185,9 +186,20 @@ BodyMotion FreeBodyEquations::platform(const RidingRobot& robot, const VectorXd&
   return P;
 }
 
-void FreeBodyEquations::derivative(const RidingRobot& robot, const VectorXd& y,
-                                   const Wrench& F_Po_I, VectorXd& dy) const {
+void FreeBodyEquations::begin(const RidingRobot& robot, std::int64_t step, const VectorXd& y) {
+  if (!model_.propulsion.any() || step == pushes_at_) return;
+  pushes_at_ = step;
   const BodyMotion P = platform(robot, y);
+  pulses_ =
+      pulsesOf(model_.propulsion.hold, pulses_, rotationVector(P.X.R), P.X.R.transpose() * P.w);
+  pushed_P_ = thrust(model_.propulsion, pulses_, static_cast<double>(step) * step_, step_);
+  pulses_ = spent(pulses_, step_);
+}
+
+void FreeBodyEquations::derivative(const RidingRobot& robot, const VectorXd& y,
+                                   const Wrench& touching_Po_I, VectorXd& dy) const {
+  const BodyMotion P = platform(robot, y);
+  const Wrench F_Po_I = touching_Po_I + rotate(P.X.R, pushed_P_);
   const Vec3 p = y.head<3>();
   dy.head<3>() = P.v;
   const Eigen::Quaterniond turn(0.0, 0.5 * P.w.x(), 0.5 * P.w.y(), 0.5 * P.w.z());

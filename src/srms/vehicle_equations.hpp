@@ -29,7 +29,7 @@ class ModalEquations {
   /// [-] of y's units that are a millimetre at the tip.
   double milli() const { return modes() > 0 ? 1e-3 / base_.Phi.cwiseAbs().maxCoeff() : 1e-3; }
   /// The interval that begins now, `step` steps after the start.
-  void begin(const RidingRobot& robot, std::int64_t step);
+  void begin(const RidingRobot& robot, std::int64_t step, const Eigen::VectorXd& y);
   /// Where P is, and how it moves.
   BodyMotion platform(const RidingRobot& robot, const Eigen::VectorXd& y) const;
   /// The robot has another load, while P moves as before.
@@ -66,12 +66,13 @@ class ModalEquations {
 class FreeBodyEquations {
  public:
   FreeBodyEquations(const FreeBodyModel& model, const Interaction& interaction,
-                    const InteractionOptions&);
+                    const InteractionOptions& options);
 
   Eigen::Index size() const { return 13; }
   Eigen::VectorXd start(const RidingRobot& robot) const;
   double milli() const { return 1e-3; }
-  void begin(const RidingRobot&, std::int64_t) {}
+  /// Thrusters are held from step to step, as a controller holds them.
+  void begin(const RidingRobot& robot, std::int64_t step, const Eigen::VectorXd& y);
   BodyMotion platform(const RidingRobot& robot, const Eigen::VectorXd& y) const;
   void load(const RidingRobot& robot, const BodyMotion& P, Eigen::VectorXd& y) const {
     y.head(size()) = stateOf(robot, P);
@@ -86,7 +87,11 @@ class FreeBodyEquations {
   const FreeBodyModel& model_;
   Vec3 p_IH_;
   Vec6 start_;
-  double mass_;  // [kg] at the start
+  double mass_;                  // [kg] at the start
+  double step_;                  // [s]
+  std::int64_t pushes_at_ = -1;  // [-] step that pushed_P_ is for
+  Pulses pulses_;
+  Wrench pushed_P_;  // by thrusters, about Po
 };
 
 using VehicleEquations = std::variant<ModalEquations, FreeBodyEquations>;

@@ -38,14 +38,6 @@ Vec3 rotationRate(const Vec3& th, const Vec3& w) noexcept {
   return w - 0.5 * th.cross(w) + th.cross(th.cross(w)) / 12.0;
 }
 
-/// [rad] the vector that rotationOf() takes to R.
-Vec3 rotationVector(const Mat3& R) noexcept {
-  const Eigen::Quaterniond q(R);
-  const double half = q.vec().norm(), angle = 2.0 * std::atan2(half, std::abs(q.w()));
-  const double per_half = half > 0.0 ? angle / half : 2.0;
-  return std::copysign(per_half, q.w()) * q.vec();
-}
-
 Vec6 velocity(const RigidState& s) noexcept { return (Vec6() << s.v, s.w).finished(); }
 
 /// The same with the acceleration under F.
@@ -139,6 +131,8 @@ void FreeBody::reset(const Vec6& x, const Mat6& M_1, double ahead) noexcept {
   const Mat6 M_P = massInP() + turned(s.R_IP.transpose(), M_1);
   now_.motion = motionOf(M_P, s, {});
   now_.motion.x = x;
+  now_.time = ahead > 0.0 ? -ahead : 0.0;
+  now_.pulses = {};
   if (ahead > 0.0 && !velocity(s).isZero(0.0)) s = advanced(M_P, M_P, s, {}, -ahead);
 }
 
@@ -157,11 +151,28 @@ void FreeBody::step(const Wrench& F_Po_I, const CarriedBody& carried, double dt,
              middle = turned(from.R_IP, 0.5 * (before + after));
   mobility_ = middle.inverse();
   damping_ = -damping * (middle * velocity(from));
-  const Wrench F = Wrench::from(F_Po_I.stacked() + damping_);
+  Wrench F = Wrench::from(F_Po_I.stacked() + damping_), F_ahead = F;
+  const Propulsion& jets = model_.propulsion;
+  if (jets.any()) {
+    const Mat3 R_PI = from.R_IP.transpose();
+    if (now_.time >= 0.0)
+      now_.pulses = pulsesOf(jets.hold, now_.pulses, rotationVector(from.R_IP), R_PI * from.w);
+    const auto thrust_I = [&](double t, double over, double turned_for) {
+      return rotate(rotationOf(turned_for * from.w) * from.R_IP,
+                    thrust(jets, now_.pulses, t, over));
+    };
+    const Wrench pushed = thrust_I(now_.time, dt, 0.5 * dt);
+    pushed_ = pushed.stacked();
+    F = F + pushed;
+    now_.pulses = spent(now_.pulses, dt);
+    now_.time += dt;
+    F_ahead = F_ahead + thrust_I(now_.time, ahead, dt + 0.5 * ahead);
+  }
   const RigidState s = advanced(before, after, from, F, dt);
   way_ << s.p - from.p, rotationVector(s.R_IP * from.R_IP.transpose());
   now_.rigid = s;
-  now_.motion = motionOf(after, advanced(after, after, s, F, ahead), F);
+  if (!(ahead > 0.0)) F_ahead = F;
+  now_.motion = motionOf(after, advanced(after, after, s, F_ahead, ahead), F_ahead);
   if (damped() < 0.0) {
     now_ = before_;
     step(F_Po_I, carried, dt, ahead, 0.0);
@@ -201,6 +212,7 @@ void FreeBody::slow(double share) noexcept {
   s.R_IP = rotationOf(share * rotationVector(s.R_IP * from.R_IP.transpose())) * from.R_IP;
   s.v *= share;
   s.w *= share;
+  now_.time = before_.time + share * (now_.time - before_.time);
   way_ *= share;
   PathPoint<6>& motion = now_.motion;  // which may be ahead
   motion.x = before_.motion.x + share * (motion.x - before_.motion.x);

@@ -282,7 +282,8 @@ void ModalVehicle::step(const Wrench& F_Po_I, const CarriedBody& carried, double
   before_ = now_;
   // What the body's momentum loses by another shape or attitude goes to base and body. The moment
   // of a body that slides is not in it: r' x v is no torque about a point that slides along.
-  Vec6 lost = carried.before.rightCols<3>() * (E_ * angleRates(before_));
+  const Mat6& M_1_before = dt > 0.0 ? carried.before : carried.M_1;
+  Vec6 lost = M_1_before.rightCols<3>() * (E_ * angleRates(before_));
   Modes middle = before_.modes;
   middle.eta += 0.5 * dt * middle.eta_dot;
   if (ground_.moves()) {

@@ -55,6 +55,7 @@ constexpr Scenario kScenarios[] = {
     {"contact_board_puma", true, true},
     {"contact_capture_puma", true, true},
     {"satellite_puma", true, false},
+    {"satellite_hold", true, false},
     {"ship_arm", true, false},
     {"deck_puma", true, false},
 };

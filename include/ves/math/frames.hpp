@@ -178,6 +178,14 @@ inline Mat3 rotationOf(const Vec3& v) {
   return R;
 }
 
+/// [rad] The vector, of at most half a turn, that rotationOf() takes to R.
+inline Vec3 rotationVector(const Mat3& R) {
+  const Eigen::Quaterniond q(R);
+  const double half = q.vec().norm(), angle = 2.0 * std::atan2(half, std::abs(q.w()));
+  const double per_half = half > 0.0 ? angle / half : 2.0;
+  return std::copysign(per_half, q.w()) * q.vec();
+}
+
 /// The matrix (3.10): skew(a) * b = a x b.
 inline Mat3 skew(const Vec3& a) {
   Mat3 S;

@@ -12,6 +12,7 @@
 
 #include "ves/robot/robot_model.hpp"
 #include "ves/vehicle/modal_vehicle.hpp"
+#include "ves/vehicle/propulsion.hpp"
 
 namespace ves {
 
@@ -20,6 +21,7 @@ struct FreeBodyModel {
   RigidBody body_P;
   Vec3 v_IPo_I = Vec3::Zero();  // [m/s]
   Vec3 w_IP_I = Vec3::Zero();   // [rad/s]
+  Propulsion propulsion;
 
   bool operator==(const FreeBodyModel&) const = default;
 };
@@ -70,7 +72,7 @@ class FreeBody {
     return 0.5 * dt_ * dt_ * covariance.cwiseProduct(mobility_).sum();
   }
   double damped() const noexcept { return -damping_.dot(way_); }
-  double shaken() const noexcept { return 0.0; }
+  double shaken() const noexcept { return pushed_.dot(way_); }  // by its thrusters
 
   const PathPoint<6>& motion() const noexcept { return now_.motion; }
 
@@ -88,6 +90,8 @@ class FreeBody {
   struct State {
     RigidState rigid;
     PathPoint<6> motion;
+    double time = 0.0;  // [s] since it was let go
+    Pulses pulses;
   };
 
   Mat6 massInP() const noexcept { return factors_.mass * M_P_; }
@@ -100,6 +104,7 @@ class FreeBody {
   double dt_ = 0.0;  // [s] of the last step
   State now_, before_;
   Vec6 way_ = Vec6::Zero();       // [m, rad] of the last step, in I
+  Vec6 pushed_ = Vec6::Zero();    // [N, N m] by thrusters in it, in I
   Vec6 damping_ = Vec6::Zero();   // [N, N m] in it
   Mat6 mobility_ = Mat6::Zero();  // [1/kg] in it: acceleration per wrench
 };
