@@ -465,6 +465,33 @@ TEST_F(Emulation, AFloatingBaseStaysWhereItsMomentumPutsIt) {
   EXPECT_LT(distance(base, truth).peak_attitude, 4e-4);  // [rad]
 }
 
+// Masses that are learnt on a base that floats are learnt of its motion too: what the robot's
+// momentum was taken for is no motion of the base once the joints rest.
+TEST_F(Emulation, WhatIsLearntLeavesAFloatingBaseNoMomentum) {
+  std::mt19937 random(11);
+  std::string moves;
+  const std::pair<double, double> ranges[] = {{-60, 60}, {-90, -20}, {60, 140}, {-60, 60}};
+  for (int k = 0; k < 30; ++k) {
+    const std::size_t joint = random() % 4;
+    std::uniform_real_distribution<double> to(ranges[joint].first, ranges[joint].second);
+    moves += fmt::format("{{at_s: {:.1f}, duration_s: 2, joint: joint_{}, to_deg_or_m: {:.0f}}}, ",
+                         1.0 + 2.4 * k, joint + 1, to(random));
+  }
+  const Experiment e = experiment(
+      "satellite_puma",
+      {"controller.compensation.learns_masses=true",
+       "program=[{move: {}}, {calibration: {}}, {admittance: {duration_s: 75}, robot: [" + moves +
+           "]}]"});
+  const Series series = run(e);
+  ASSERT_TRUE(result_.good());
+  const Motion base = commanded(series);
+  double fastest = 0.0;
+  for (const Vec6& v : base.x_dot) fastest = std::max(fastest, v.head<3>().norm());
+  EXPECT_GT(fastest, 5e-3);                             // [m/s]
+  EXPECT_LT(base.x_dot.back().head<3>().norm(), 2e-5);  // [m/s]
+  EXPECT_LT(base.x_dot.back().tail<3>().norm(), 2e-5);  // [rad/s]
+}
+
 TEST_F(Emulation, WhatIsLearntGoesByTheTimesThatTheMachineEchoes) {
   Rig rig(experiment("z_sine", with(kCompensated, kAdapts), {}));
   const std::int64_t period = 10'000'000;  // [ns]

@@ -100,9 +100,18 @@ Wrench RobotInertia::update(const KnownPayload& known, std::int64_t count, const
     platform_ = {};
     return {};
   }
-  const bool first = !known_ || known.changed();
-  if (first || count % mass_update_ == 0)
-    composite_P_ = combine(RigidBody{}, known.payload().X_PL0(), compositeBody(known.carried(), q));
+  const bool first = !known_, other = known_ && known.changed();
+  const auto compositeAt = [&](const JointVector& at) {
+    return combine(RigidBody{}, known.payload().X_PL0(), compositeBody(known.carried(), at));
+  };
+  if (other) {  // which has moved as before: its momentum loses nothing on the way
+    whole_ = scale_ * spatialMass(rotated(R_IP_, compositeAt(composite_q_)));
+    whole_before_ = whole_;
+  }
+  if (first || other || count % mass_update_ == 0) {
+    composite_P_ = compositeAt(q);
+    composite_q_ = q;
+  }
   known_ = true;
   if (first || since > 0.0) {
     whole_before_ = whole_;

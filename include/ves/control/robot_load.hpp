@@ -111,8 +111,9 @@ class RobotInertia {
   double scale_;     // [-] of it that the wrench shows
   Geometry geometry_;
   RigidBody composite_P_;
-  bool known_ = false;         // composite_P_, since the legs were engaged
-  Mat6 whole_ = Mat6::Zero();  // M_1 of all of it
+  JointVector composite_q_ = JointVector::Zero();  // [rad | m] that it was found at
+  bool known_ = false;                             // composite_P_, since the legs were engaged
+  Mat6 whole_ = Mat6::Zero();                      // M_1 of all of it
   Mat6 whole_before_ = Mat6::Zero();
   Mat3 R_IP_ = Mat3::Identity(), R_IP_before_ = Mat3::Identity();  // where they were so
   double since_ = 0.0;                                             // [s] between the two
