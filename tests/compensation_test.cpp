@@ -442,17 +442,23 @@ TEST_F(Emulation, AnUntoldLoadIsLearntOnceTheGripperIsToldToHaveMoved) {
   EXPECT_GT(share(e, untold), 0.2);  // what it is about
 }
 
-// Half a ton afloat for two minutes: sums of forces would drift, those of momenta do not.
-TEST_F(Emulation, AFloatingBaseStaysWhereItsMomentumPutsIt) {
+/// A PUMA's first four joints, drawn one after the other, 2 s each: a list for a program.
+std::string randomMoves(int count) {
   std::mt19937 random(11);
   std::string moves;
   const std::pair<double, double> ranges[] = {{-60, 60}, {-90, -20}, {60, 140}, {-60, 60}};
-  for (int k = 0; k < 48; ++k) {
+  for (int k = 0; k < count; ++k) {
     const std::size_t joint = random() % 4;
     std::uniform_real_distribution<double> to(ranges[joint].first, ranges[joint].second);
     moves += fmt::format("{{at_s: {:.1f}, duration_s: 2, joint: joint_{}, to_deg_or_m: {:.0f}}}, ",
                          1.0 + 2.4 * k, joint + 1, to(random));
   }
+  return moves;
+}
+
+// Half a ton afloat for two minutes: sums of forces would drift, those of momenta do not.
+TEST_F(Emulation, AFloatingBaseStaysWhereItsMomentumPutsIt) {
+  const std::string moves = randomMoves(48);
   const Experiment e = experiment(
       "satellite_puma",
       {"program=[{move: {}}, {calibration: {}}, {admittance: {duration_s: 120}, robot: [" + moves +
@@ -468,15 +474,7 @@ TEST_F(Emulation, AFloatingBaseStaysWhereItsMomentumPutsIt) {
 // Masses that are learnt on a base that floats are learnt of its motion too: what the robot's
 // momentum was taken for is no motion of the base once the joints rest.
 TEST_F(Emulation, WhatIsLearntLeavesAFloatingBaseNoMomentum) {
-  std::mt19937 random(11);
-  std::string moves;
-  const std::pair<double, double> ranges[] = {{-60, 60}, {-90, -20}, {60, 140}, {-60, 60}};
-  for (int k = 0; k < 30; ++k) {
-    const std::size_t joint = random() % 4;
-    std::uniform_real_distribution<double> to(ranges[joint].first, ranges[joint].second);
-    moves += fmt::format("{{at_s: {:.1f}, duration_s: 2, joint: joint_{}, to_deg_or_m: {:.0f}}}, ",
-                         1.0 + 2.4 * k, joint + 1, to(random));
-  }
+  const std::string moves = randomMoves(30);
   const Experiment e = experiment(
       "satellite_puma",
       {"controller.compensation.learns_masses=true",

@@ -90,6 +90,9 @@ RigidState advanced(const Mat6& M_P, const Mat6& M_then_P, const RigidState& fro
     struct Rates {
       Vec3 th, L, shifted;
     };
+    // (J_c w)' = n - c x f + (w x c) x m c_rel', where m c_rel' is the linear momentum of the
+    // joints, which shows in how they move the centre: with f and n of their momentum h, J_c w +
+    // h_c stays.
     const auto rates = [&](double part, const Vec3& th, const Vec3& momentum) -> Rates {
       const double share = (i + part) / steps;
       const Mat3 R = rotationOf(th) * to.R_IP;
