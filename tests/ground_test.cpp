@@ -132,6 +132,36 @@ TEST(Ground, TheModelIsItsClosedFormToTheOrderOfItsStep) {
   }
 }
 
+TEST(Ground, WhatStandsOnTheVehicleIsShakenWithIt) {
+  // A mass at the platform's origin, moved along: the same closed form of a heavier oscillator.
+  constexpr double kMass = 0.8;  // [kg] on one of 1 kg
+  const ModalModel modes = oscillators(0.05);
+  const double w = 2.0 * M_PI * 0.4;
+  Vec6 a = Vec6::Zero(), b = Vec6::Zero();
+  a.head<3>() << 0.02, -0.01, 0.03;
+  b.head<3>() << -0.01, 0.02, 0.01;
+  Interaction i;
+  i.vehicle = modes;
+  i.vehicle.ground = wave(w, a, b);
+  i.payload.robot.base = {kMass, Vec3::Zero(), 0.1 * Mat3::Identity()};
+  InteractionOptions options;
+  options.model = InteractionModel::kWhole;
+  options.tolerance = 1e-12;
+  options.duration = 10'000'000'000;
+  AdmittanceModel model(i.vehicle, kPeriod);
+  model.reset(Vec6::Zero());
+  const Mat6 M_1 = spatialMass(i.payload.robot.base);
+  for (const InteractionPoint& p : simulate(i, options)) {
+    if (p.t > 0.0) model.step(Wrench{}, M_1, kPeriod, 0.0);
+    for (int k = 0; k < 3; ++k) {
+      const double should = shaken(modes.stiffness(k) / (1.0 + kMass),
+                                   modes.damping(k, k) / (1.0 + kMass), w, a(k), b(k), p.t);
+      ASSERT_NEAR(p.x(k), should, 1e-9) << k << " at " << p.t;
+      ASSERT_NEAR(model.motion().x(k), should, 1e-5) << k << " at " << p.t;
+    }
+  }
+}
+
 TEST(Ground, ForetellsAndTellsRates) {
   VehicleModel vehicle = oscillators(0.05);
   vehicle.ground = wave(2.0 * M_PI * 0.4, Vec6::Constant(0.02), Vec6::Constant(-0.01), 1.0);
