@@ -16,6 +16,7 @@ namespace {
     const Value* about = document.find("description");
     fmt::print("  {:<24}{}\n", name, about ? about->text : "");
   }
+  std::fflush(stdout);  // whatever comes after it comes behind it
   throw InputError("which scenario? One of these, or a path to a .yaml file");
 }
 

@@ -104,7 +104,7 @@ TEST(JointMomentum, IsWhatTheSensorShowsOfALinkThatSwings) {
       Sample s;
       s.time = s.wrench_time = s.joints_time = k * kTick;
       s.q(0) = angle(1e-2 * k);
-      joints.update(known, s, Mat3::Identity(), 1e-2);
+      joints.update(known, s, Mat3::Identity(), Mat3::Identity(), 1e-2);
       const Vec6 F = joints.shown(turning).stacked();
       if (k < 50 || k % 5 != 0) continue;
       const Vec6 should =
@@ -128,7 +128,7 @@ TEST(JointMomentum, KnowsSamplesThatComeUnevenlyAndAWrenchThatIsOlder) {
     s.time = s.joints_time = k * kTick + jitter(random);
     s.wrench_time = s.joints_time - 4'000'000;
     s.q(0) = angle(1e-9 * static_cast<double>(s.joints_time));
-    joints.update(known, s, Mat3::Identity(), 1e-2);
+    joints.update(known, s, Mat3::Identity(), Mat3::Identity(), 1e-2);
     const double F = joints.shown(Vec3::Zero()).f(1);
     if (k < 50 || k % 10 != 0) continue;
     const double should =
@@ -147,7 +147,7 @@ TEST(JointMomentum, JointsThatStandGiveNoneAndAPauseBeginsAnew) {
     Sample s;
     s.wrench_time = s.joints_time = k * kTick;
     s.q(0) = 0.7;
-    joints.update(known, s, Mat3::Identity(), 1e-2);
+    joints.update(known, s, Mat3::Identity(), Mat3::Identity(), 1e-2);
     EXPECT_EQ(joints.shown(Vec3::Zero()).stacked(), Vec6(Vec6::Zero()));
     EXPECT_EQ(joints.force().stacked(), Vec6(Vec6::Zero()));
   }
@@ -156,7 +156,7 @@ TEST(JointMomentum, JointsThatStandGiveNoneAndAPauseBeginsAnew) {
     Sample s;
     s.wrench_time = s.joints_time = (500 + k) * kTick;
     s.q(0) = -0.7 + 0.1 * k;
-    joints.update(known, s, Mat3::Identity(), 1e-2);
+    joints.update(known, s, Mat3::Identity(), Mat3::Identity(), 1e-2);
     EXPECT_EQ(joints.shown(Vec3::Zero()).stacked(), Vec6(Vec6::Zero()));
     EXPECT_EQ(joints.force().stacked(), Vec6(Vec6::Zero()));
   }
@@ -175,7 +175,7 @@ TEST(JointMomentum, StaysWhereADriverOfTheJointsIsSlowerThanTheTick) {
         s.time = s.wrench_time = k * kTick;
         s.joints_time = k / every * every * kTick;
         s.q(0) = angle(1e-2 * (k / every * every));
-        joints.update(known, s, Mat3::Identity(), 1e-2);
+        joints.update(known, s, Mat3::Identity(), Mat3::Identity(), 1e-2);
         const double F = joints.shown(Vec3::Zero()).f(1);
         if (k < 50) continue;
         const double should = filtered(c.servo.sensor_cutoff, 1e-2 * k, averaged ? 1e-2 : 0.0)(1);
@@ -195,7 +195,7 @@ TEST(JointMomentum, AnglesThatAreOlderBeginAnew) {
     Sample s;
     s.wrench_time = s.joints_time = time * kTick;
     s.q(0) = angle(1e-2 * static_cast<double>(time));
-    joints.update(known, s, Mat3::Identity(), 1e-2);
+    joints.update(known, s, Mat3::Identity(), Mat3::Identity(), 1e-2);
     EXPECT_TRUE(joints.shown(Vec3::Zero()).stacked().allFinite()) << time;
     EXPECT_TRUE(joints.force().stacked().allFinite()) << time;
   }
@@ -215,7 +215,7 @@ TEST(JointMomentum, CarriesReadingsToTheTimeOfTheWrench) {
       s.joints_time = (k * kTick) / 13'000'000 * 13'000'000;  // every 13 ms
       s.q(0) = 0.3 + 0.4e-9 * static_cast<double>(s.joints_time);
       const double now = 0.3 + 0.4e-9 * static_cast<double>(s.time);
-      joints.update(known, s, Mat3::Identity(), 1e-2);
+      joints.update(known, s, Mat3::Identity(), Mat3::Identity(), 1e-2);
       if (k > 3) {
         EXPECT_NEAR(joints.at(s)(0), compensated ? now : s.q(0), 1e-12) << k;
       }
@@ -226,13 +226,13 @@ TEST(JointMomentum, CarriesReadingsToTheTimeOfTheWrench) {
     s.joints_time = s.time + kTick;
     s.wrench_time = s.joints_time - 8'000'000;
     s.q(0) = 0.3 + 0.4e-9 * static_cast<double>(s.joints_time);
-    joints.update(known, s, Mat3::Identity(), 1e-2);
+    joints.update(known, s, Mat3::Identity(), Mat3::Identity(), 1e-2);
     const double then = 0.3 + 0.4e-9 * static_cast<double>(s.wrench_time);
     EXPECT_NEAR(joints.at(s)(0), compensated ? then : s.q(0), 1e-12);
     // Of a reading that is older than others, or that was there already, nothing is divided.
     s.joints_time -= 13'000'000;
     EXPECT_TRUE(joints.at(s).allFinite());
-    joints.update(known, s, Mat3::Identity(), 1e-2);
+    joints.update(known, s, Mat3::Identity(), Mat3::Identity(), 1e-2);
     EXPECT_EQ(joints.at(s), s.q);
   }
 }
@@ -259,7 +259,7 @@ TEST(JointMomentum, ScattersAsItsReadingsAreBelievedTo) {
       if (s.joints_time != read) q = scatter(random);
       read = s.joints_time;
       s.q(0) = q;
-      joints.update(known, s, Mat3::Identity(), 1e-2);
+      joints.update(known, s, Mat3::Identity(), Mat3::Identity(), 1e-2);
       if (k >= 10) squares += std::pow(joints.q_dot()(0), 2) / (kTicks - 10);
     }
     const double foretold = kScatter * JointParabola(c).speed;
@@ -425,10 +425,10 @@ TEST(AidedWrench, KnowsWhatRoundedLegsMakeOfWeightAndInertia) {
   LegMotion standing;
   standing.L = L;
   RobotInertia inertia(c);
-  inertia.update(KnownPayload(c), 0, q, 0.0, X_IP, standing, true, 1.0);
+  inertia.update(KnownPayload(c), 0, q, 0.0, X_IP, X_IP.R, standing, true, 1.0);
   joints.reset(q);
   aided.update({Wrench{}, static_wrench, carried(c.payload), inertia, joints, samples, bias, X_IP,
-                1.0, false},
+                Emulated{}, 1.0, false},
                true);
   EXPECT_LT((aided.noise().weight - weight).norm(), 1e-4 * weight.norm());
   EXPECT_LT((aided.noise().legs - legs.cwiseSqrt()).norm(), 1e-4 * legs.cwiseSqrt().norm());

@@ -30,28 +30,38 @@ constexpr const char* kCompensated =
 
 class NoHeap : public testing::TestWithParam<const char*> {};
 
+void expectNoHeap(const Experiment& e) {
+  TestPlatform platform(e.controller);
+  plant::Plant plant(e.plant);
+  TickInput in;
+  in.order.request = Request::kStart;
+  const TickState* state = nullptr;
+  test::MallocGuard guard;
+  for (; in.tick < 6000 && !(state && test::done(*state)); ++in.tick) {
+    in.time = in.tick * e.controller.period;
+    in.sample = plant.sample();
+    state = &platform.tick(in);
+    plant.command(state->command);
+    plant.advance((in.tick + 1) * e.controller.period);
+  }
+  const std::int64_t calls = guard.count();
+  EXPECT_EQ(calls, 0);
+  EXPECT_EQ(state->phase, Phase::kParked);
+}
+
 TEST_P(NoHeap, FromArmingToParking) {
   for (const char* base :
        {"seed=1", kCompensated, "sensor.readings_per_tick=4", "legs.model=hydraulic",
         "base={mass_diagonal: [500,500,500,250,250,250], damping_diagonal: "
-        "[500,400,300,200,100,90], stiffness_diagonal: [1500,2500,4000,1500,1000,2000]}"}) {
-    const Experiment e = experiment(GetParam(), {base});
-    TestPlatform platform(e.controller);
-    plant::Plant plant(e.plant);
-    TickInput in;
-    in.order.request = Request::kStart;
-    const TickState* state = nullptr;
-    test::MallocGuard guard;
-    for (; in.tick < 6000 && !(state && test::done(*state)); ++in.tick) {
-      in.sample = plant.sample();
-      state = &platform.tick(in);
-      plant.command(state->command);
-      plant.advance((in.tick + 1) * e.controller.period);
-    }
-    const std::int64_t calls = guard.count();
-    EXPECT_EQ(calls, 0);
-    EXPECT_EQ(state->phase, Phase::kParked);
-  }
+        "[500,400,300,200,100,90], stiffness_diagonal: [1500,2500,4000,1500,1000,2000]}"})
+    expectNoHeap(experiment(GetParam(), {base}));
+}
+
+TEST(NoHeapInFlight, FromArmingToParking) {
+  expectNoHeap(
+      experiment("servicer_capture",
+                 {"controller.moving_frame.enabled=true", "base.free.velocity_m_per_s=[3, 0, 0]",
+                  "environment.target.velocity_m_per_s=[2.98, 0, 0]"}));
 }
 
 /// Every kind of order, taken and refused: their paths are gone through inside the tick.

@@ -40,9 +40,10 @@ Numbers numbersOf(const S& s) {
       add(field.value.stacked().eval());
     else if constexpr (std::same_as<V, Tripped>)
       out.emplace_back(field.name, field.value.bits());
-    else if constexpr (std::same_as<V, Mat6>) {
-      for (int i = 0; i < 36; ++i)
-        out.emplace_back(field.name + ("[" + std::to_string(i) + "]"), field.value(i / 6, i % 6));
+    else if constexpr (std::same_as<V, Mat6> || std::same_as<V, Mat3>) {
+      const int n = static_cast<int>(field.value.cols());
+      for (int i = 0; i < n * n; ++i)
+        out.emplace_back(field.name + ("[" + std::to_string(i) + "]"), field.value(i / n, i % n));
     } else if constexpr (requires { std::size(field.value); })
       add(field.value);
     else
@@ -77,8 +78,9 @@ S filled() {
     } else if constexpr (std::same_as<V, Pose>) {
       for (Vec3* half : {&value.p, &value.rpy})
         for (double& x : *half) set(x);
-    } else if constexpr (std::same_as<V, Mat6>) {
-      for (int i = 0; i < 36; ++i) set(value(i / 6, i % 6));
+    } else if constexpr (std::same_as<V, Mat6> || std::same_as<V, Mat3>) {
+      for (auto row : value.rowwise())
+        for (double& x : row) set(x);
     } else if constexpr (std::same_as<V, Tripped>) {
       value = Tripped(static_cast<std::uint32_t>(++n));
     } else if constexpr (requires { std::begin(value); }) {
@@ -145,7 +147,11 @@ TEST(Schema, EveryFieldComesOutOfItsMessage) {
     EXPECT_EQ(numbersOf(*back), numbersOf(s));
   };
   goes(filledSample(), toMessage(filledSample(), {1, 2}));
-  goes(filled<LegCommand>(), toMessage(filled<LegCommand>(), header({1, 2}, 3, 4)));
+  LegCommand command = filled<LegCommand>();
+  command.laboratory.E_H.X.R = rotationOf({0.3, -0.7, 2.0});
+  goes(command, toMessage(command, header({1, 2}, 3, 4)));
+  command.laboratory.E_H.X.R(1, 2) += 1e-3;  // which turns nothing
+  EXPECT_FALSE(fromMessage(toMessage(command, header({1, 2}, 3, 4))));
   goes(filledSetup(), toMessage(filledSetup(), header({1, 2}, 3, 4)));
   goes(filled<TickState>(), toMessage(filled<TickState>(), header({1, 2}, 3, 4)));
   goes(filledOrder(), toMessage(filledOrder(), header({1, 2}, 3, 4)));
@@ -283,6 +289,10 @@ std::set<std::string> everTold() {
                             "controller.passivity.damping_per_s=5"});
     order(loop, Request::kStart, 2500);
   }
+  {  // a laboratory that flies along
+    Lockstep loop = loopOf("satellite_tumbling", {});
+    order(loop, Request::kStart, 500);
+  }
   {  // calibrations, a monitor segment, refusals and a trip, ticks missed, a node that conflicts
     Lockstep loop = loopOf("puma_on_table_4_1", {});
     run(loop, 20);
@@ -339,6 +349,7 @@ TEST(Schema, EveryFieldHasItsColumnsWithTheirUnits) {
   Experiment e = ninebodied(test::experiment("srms_capture_doss"));
   Compensation& compensation = e.controller.compensation;
   compensation.aided = compensation.adaptation = compensation.learns_masses = true;
+  e.controller.moving_frame.enabled = true;
   Row row;
   row.state = toMessage(filled<TickState>(), header({1, 2}, 3, 4));
   const std::vector<Column> all = columns(e);
@@ -376,6 +387,8 @@ TEST(Schema, EveryFieldHasItsColumnsWithTheirUnits) {
   EXPECT_EQ(number("energy_paid_j"), s.energy_paid);
   EXPECT_EQ(number("passivity_damping_per_s"), s.passivity_damping);
   EXPECT_EQ(number("ahead_ns"), static_cast<double>(s.command.ahead));
+  EXPECT_EQ(number("r32_laboratory"), s.command.laboratory.E_H.X.R(2, 1));
+  EXPECT_EQ(number("y_laboratory_rate_rad_per_s"), s.command.laboratory.E_H.w(1));
   EXPECT_EQ(table.at("phase"), "armed");
   EXPECT_EQ(table.at("kind"), "move");
   EXPECT_EQ(table.at("cause"), "floor mat");

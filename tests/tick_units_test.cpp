@@ -246,20 +246,23 @@ TEST(RobotInertia, IsMassTimesAccelerationOfAPlatformThatSlides) {
   BodyMotion P{g.fromHome({}), Vec3::Zero(), Vec3::Zero(), a, Vec3::Zero()};
   const LegMotion legs = legMotion(g, P);
   const JointVector q = JointVector::Zero();
-  EXPECT_EQ(
-      inertia.update(KnownPayload(config), 0, q, 0.01, P.X, legs, false, 1.0).stacked().norm(),
-      0.0);  // not engaged
-  const Wrench F = inertia.update(KnownPayload(config), 0, q, 0.01, P.X, legs, true, 0.5);
+  EXPECT_EQ(inertia.update(KnownPayload(config), 0, q, 0.01, P.X, P.X.R, legs, false, 1.0)
+                .stacked()
+                .norm(),
+            0.0);  // not engaged
+  const Wrench F = inertia.update(KnownPayload(config), 0, q, 0.01, P.X, P.X.R, legs, true, 0.5);
   const double mass = 52.45 + 16.0 + 5.0;  // the PUMA with link 0, adapter, top plate
   EXPECT_LT((F.f - 0.5 * mass * a).norm(), 1e-9 * mass);
   EXPECT_NEAR(inertia.M_1()(0, 0), 0.5 * mass, 1e-9);
   config.servo.sensor_scale = 1.1;  // as an identification has found
   const Wrench shown =
-      RobotInertia(config).update(KnownPayload(config), 0, q, 0.01, P.X, legs, true, 0.5);
+      RobotInertia(config).update(KnownPayload(config), 0, q, 0.01, P.X, P.X.R, legs, true, 0.5);
   EXPECT_LT((shown.stacked() - 1.1 * F.stacked()).norm(), 1e-9 * mass);
   ControllerConfig published = puma();
   RobotInertia none(published);
-  EXPECT_EQ(none.update(KnownPayload(published), 0, q, 0.01, P.X, legs, true, 1.0).stacked().norm(),
+  EXPECT_EQ(none.update(KnownPayload(published), 0, q, 0.01, P.X, P.X.R, legs, true, 1.0)
+                .stacked()
+                .norm(),
             0.0);
 }
 
@@ -386,7 +389,7 @@ TEST(RobotInertia, KnowsALoadAtOnceHoweverLongItKeepsItsBody) {
   const LegMotion legs = legMotion(config.geometry, P);
   const auto mass = [&](std::int64_t count, std::int32_t segment) {
     known.update({count, count, 0, 0, 0}, segment);
-    inertia.update(known, count, JointVector::Zero(), 0.01, P.X, legs, true, 1.0);
+    inertia.update(known, count, JointVector::Zero(), 0.01, P.X, P.X.R, legs, true, 1.0);
     return inertia.M_1()(0, 0);
   };
   const double empty = mass(0, -1);
@@ -615,11 +618,11 @@ TEST(RobotInertia, IsThereFromTheFirstTickOnHoweverSeldomItIsRefreshed) {
   JointVector q = JointVector::Zero();
   for (const std::int64_t count : {7, 8}) {  // armed, and again after a reset, the robot elsewhere
     q(1) -= 1.0;
-    each.update(known, 0, q, 0.01, X_IP, legs, true, 1.0);
-    seldom.update(known, count, q, 0.01, X_IP, legs, true, 1.0);
+    each.update(known, 0, q, 0.01, X_IP, X_IP.R, legs, true, 1.0);
+    seldom.update(known, count, q, 0.01, X_IP, X_IP.R, legs, true, 1.0);
     EXPECT_EQ(seldom.M_1(), each.M_1()) << count;
     EXPECT_GT(seldom.M_1()(0, 0), 10.0);
-    seldom.update(known, count, q, 0.01, X_IP, legs, false, 0.0);
+    seldom.update(known, count, q, 0.01, X_IP, X_IP.R, legs, false, 0.0);
   }
 }
 

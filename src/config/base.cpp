@@ -255,7 +255,7 @@ Base readFree(Section& s) {
   FreeBodyModel free;
   Section section = s.section("free");
   if (section.has("velocity_m_per_s"))
-    free.v_IPo_I = section.vector("velocity_m_per_s", 3, -1.0, 1.0);
+    free.v_IPo_I = section.vector("velocity_m_per_s", 3, -1e4, 1e4);
   if (section.has("rate_deg_per_s"))
     free.w_IP_I = kDegree * section.vector("rate_deg_per_s", 3, -90.0, 90.0);
   if (section.has("thrusters"))

@@ -71,6 +71,28 @@ Passivity readPassivity(Section& controller) {
 }
 
 /// Off without the key.
+MovingFrameSettings readMovingFrame(Section& controller, const Compensation& compensation) {
+  MovingFrameSettings f;
+  if (!controller.has("moving_frame")) return f;
+  Section s = controller.section("moving_frame");
+  f.enabled = s.flag("enabled");
+  if (f.enabled && !compensation.aided)
+    s.fail("enabled",
+           "what the laboratory does to the robot has to be told from what the robot does, "
+           "want 'wrench: aided' in controller.compensation");
+  if (f.enabled && compensation.learns_masses)
+    s.fail("enabled",
+           "what a wrong mass has done to a vehicle that tumbles is not taken back yet, "
+           "want 'learns_masses: false' in controller.compensation");
+  f.share = s.number("share", 0.01, 1.0);
+  f.acceleration = s.number("acceleration_m_per_s2", 1e-4, 10.0);
+  f.angular_acceleration = s.number("acceleration_deg_per_s2", 1e-3, 1e3) * kDegree;
+  f.steady_in_contact = s.flag("steady_in_contact");
+  s.finish();
+  return f;
+}
+
+/// Off without the key.
 WrenchFilterSettings readWrenchFilter(Section& controller) {
   WrenchFilterSettings f;
   if (!controller.has("wrench_filter")) return f;
@@ -102,6 +124,7 @@ void readController(Section s, ControllerConfig& c) {
   c.tare_ramp = s.number("tare_ramp_s", 0.01, 100.0);
   c.compensation = readCompensation(s);
   c.passivity = readPassivity(s);
+  c.moving_frame = readMovingFrame(s, c.compensation);
   c.wrench_filter = readWrenchFilter(s);
   Section still = s.section("still");
   c.stillness.leg_counts = static_cast<int>(still.integer("leg_counts", 0, 1000));

@@ -12,7 +12,6 @@
 #include "ves/config/masses.hpp"
 #include "ves/config/servo.hpp"
 #include "ves/control/gravity_compensation.hpp"
-#include "ves/control/path_checks.hpp"
 #include "ves/core/coordinates.hpp"
 #include "ves/math/dense.hpp"
 #include "ves/plant/nominal_servo.hpp"
@@ -53,35 +52,6 @@ std::int64_t endOf(MovingRobot& robot, const RobotAction& action, std::int64_t n
 }
 
 /// Warns of channels that the weight alone nearly fills, in the robot's poses and level.
-/// As long as the program asks for it, and within what the platform may do.
-void requireGroundFits(Section& root, const ControllerConfig& c) {
-  constexpr double kStep = 0.02;  // [s]
-  const GroundMotion& ground = c.vehicle.ground;
-  const double longest = c.longestAdmittance();
-  if (!ground.moves() || longest == 0.0) return;
-  if (!(ground.lasts() >= longest))
-    root.section("base").fail(
-        "ground", fmt::format("its recording lasts {:.4g} s, and admittance control {:.4g} s; want "
-                              "a longer one, or less of the program",
-                              ground.lasts(), longest));
-  const PathChecks checks(c.safety, c.geometry);
-  Vec6 last = Vec6::Zero();
-  for (int i = 0; i * kStep <= longest; ++i) {
-    const Pose x = Pose::from(ground.at(i * kStep).x);
-    const Transform X_IP = c.geometry.fromHome(x);
-    const Vec6 L = legLengths(c.geometry, X_IP);
-    Tripped t = checks.pose(X_IP, x, L);
-    if (!t.any() && i > 0) t = checks.step(L, last, kStep);
-    last = L;
-    if (t.any())
-      root.section("base").fail(
-          "ground", fmt::format("after {:.2f} s it is at {:.3f} {:.3f} {:.3f} m, {:.1f} {:.1f} "
-                                "{:.1f} deg, and the {} check would stop the run; want less of it",
-                                i * kStep, x.p.x(), x.p.y(), x.p.z(), x.rpy.x() / kDegree,
-                                x.rpy.y() / kDegree, x.rpy.z() / kDegree, name(t.first())));
-  }
-}
-
 void warnOfFullChannels(Experiment& e) {
   constexpr double kMostShare = 0.9, kFullScale = 32767.0;  // [-], [count]
   const Mat6 S_proc = e.plant.sensor.S_proc();
@@ -305,6 +275,7 @@ Experiment build(const Value& document, AskedKey* asked = nullptr) {
 
   readProgram(root, out);
   requireGroundFits(root, c);
+  requireFrameFits(root, c, p.task);
   if (const std::string proposal = proposeExcitation(root, c); !proposal.empty())
     out.source.notes.push_back(proposal);
   ToldLoads& told = c.told_loads;

@@ -95,6 +95,11 @@ void readProgram(Section& root, Experiment& out);
 /// told afterwards
 MachinePieces readMachine(Section s, std::int64_t controller_period, Resonance& resonance);
 
+/// base.ground, within what the platform may do for as long as the program asks for it
+void requireGroundFits(Section& root, const ControllerConfig& c);
+/// controller.moving_frame, with what it needs
+void requireFrameFits(Section& root, const ControllerConfig& c, const RobotTask& task);
+
 /// plant_mismatch
 void readPlantMismatch(Section s, plant::PlantConfig& p);
 

@@ -24,6 +24,9 @@ constexpr double kMaxLoadInertia = 1e7;             // [kg m^2]
 
 constexpr double kMaxWrenchPerCount = 1e6;  // [N | N m]
 
+constexpr double kMaxFlight = 1e9;   // [m], and per s, of the laboratory
+constexpr double kMaxTurning = 1e4;  // [rad/s]
+
 template <typename T>
 bool inRange(T x, T lo, T hi) {
   return x >= lo && x <= hi;
@@ -79,6 +82,13 @@ bool plausible(const PushOrder& order) {
          inRange(order.duration, kShortestPush, kLongestPush);
 }
 
+bool plausible(const Laboratory& lab) {
+  const BodyMotion& H = lab.E_H;
+  return inRange<std::int64_t>(lab.time, 0, kMaxTime) && within(H.X.p, kMaxFlight) &&
+         (H.X.R * H.X.R.transpose() - Mat3::Identity()).norm() <= 1e-6 && within(H.v, kMaxFlight) &&
+         within(H.w, kMaxTurning) && within(H.a, kMaxFlight) && within(H.alpha, kMaxTurning);
+}
+
 bool plausible(const VehicleOrder& order) {
   for (const double factor : {order.to.mass, order.to.damping, order.to.stiffness})
     if (!(factor == 0.0 || inRange(factor, kLeastVehicleFactor, kMostVehicleFactor))) return false;
@@ -99,7 +109,7 @@ bool plausible(const Sample& s) noexcept {
 
 bool plausible(const LegCommand& c) noexcept {
   return inRange(c.segment, -1, kMaxSegments) && inRange<std::int64_t>(c.ahead, 0, kMostAhead) &&
-         legCounts(c.counts) && legCounts(c.rest);
+         legCounts(c.counts) && legCounts(c.rest) && plausible(c.laboratory);
 }
 
 bool plausible(const RobotOrder& order) noexcept {

@@ -9,6 +9,7 @@ namespace ves {
 
 AdmittanceControl::AdmittanceControl(const ControllerConfig& config)
     : model_(config.vehicle, config.periodSeconds()),
+      frame_(config),
       hindsight_(config.periodSeconds()),
       inertia_(config.compensation.inertia),
       aided_(config.compensation.aided),
@@ -27,7 +28,13 @@ AdmittanceControl::AdmittanceControl(const ControllerConfig& config)
 
 void AdmittanceControl::begin(const Vec6& x, const Mat6& M_1, double age, double share) noexcept {
   change_.finish(model_);
-  model_.reset(x, M_1, inertia_ ? age + share * wrench_delay_ : 0.0);
+  const double ahead = inertia_ ? age + share * wrench_delay_ : 0.0;
+  if (frame_.enabled()) {
+    model_.reset(frame_.emulated(x), rotated(frame_.laboratory().X.R, M_1), ahead);
+    frame_.begin(model_.bodyMotion());
+  } else {
+    model_.reset(x, M_1, ahead);
+  }
   begins_ = true;
   shaken_ = 0.0;
   oscillation_.reset();
@@ -44,44 +51,50 @@ void AdmittanceControl::change(const VehicleOrder& order, bool emulated) noexcep
   if (!emulated) change_.finish(model_);
 }
 
-const PathPoint<6>& AdmittanceControl::step(const AdmittanceInput& in, const Vec6& last,
+const PathPoint<6>& AdmittanceControl::step(const AdmittanceInput& in, const PathPoint<6>& last,
                                             const PathChecks& checks) noexcept {
-  if (in.F_Po_I.stacked().allFinite()) {
+  if (in.F_Po_E.stacked().allFinite()) {
     const double since = begins_ ? std::min(in.wrench.since, period_) : in.wrench.since;
     if (begins_ && aided_) hindsight_.reset(model_, in.lesson);
     begins_ = false;
     change_.advance(model_);
+    if (frame_.enabled()) {
+      const bool steady = frame_.steadyInContact() && in.touches;
+      frame_.step(last, model_.coasting(), steady ? 0.0 : in.share);
+    }
     const double damping = energy_.damping() + change_.damping();
     if (inertia_)
-      model_.step(in.F_Po_I, in.body, since, in.wrench.age + in.share * wrench_delay_, damping);
+      model_.step(in.F_Po_E, in.body, since, in.wrench.age + in.share * wrench_delay_, damping);
     else
-      model_.step(in.F_Po_I, damping);
+      model_.step(in.F_Po_E, damping);
     if (aided_) {
       hindsight_.step(model_, in.body.M_1, since, in.lesson);
       if (hindsight_.any()) model_.displace(hindsight_.due());
     }
+    shown_ = frame_.enabled() ? frame_.shown(model_.bodyMotion()) : model_.motion();
     slowInsideEnvelope(last, in.L, checks);
     // Each is paid by its share of the damping.
     const double for_change =
         change_.damping() > 0.0 ? model_.damped() * (change_.damping() / damping) : 0.0;
     change_.pay(for_change);
-    energy_.take({model_.taken(in.F_Po_I), model_.takenOfNoise(in.noise), model_.dissipated(),
+    energy_.take({model_.taken(in.F_Po_E), model_.takenOfNoise(in.noise), model_.dissipated(),
                   model_.damped() - for_change, model_.kineticEnergy()},
-                 port_.take(in.at_port, in.wrench.time, in.X_IP, in.servo));
+                 port_.take(in.at_port, in.wrench.time, in.wrench.age, in.X_IP, in.servo, frame_));
     const SafetyLimits& limits = checks.limits();
     const bool held = scale_ < 1.0 && model_.kineticEnergy() > limits.growth_floor;
     shaken_ += model_.shaken();
     oscillation_.take(limits, model_.energy() - shaken_, held, in.q, joint_moves_, period_);
   }
-  return model_.motion();
+  return shown_;
 }
 
 /// Slows the motion as a whole, never one leg, so that it can always come to rest, braking gently
-/// along its path, where every path check still passes.
-void AdmittanceControl::slowInsideEnvelope(const Vec6& last, const Vec6& L,
+/// along its path, where every path check still passes. A laboratory that flies is what is slowed,
+/// else the vehicle.
+void AdmittanceControl::slowInsideEnvelope(const PathPoint<6>& from, const Vec6& L,
                                            const PathChecks& checks) noexcept {
   const Geometry& geometry = checks.geometry();
-  const Vec6 step = model_.motion().x - last, rate = model_.motion().x_dot;
+  const Vec6 last = from.x, step = shown_.x - last, rate = shown_.x_dot;
   constexpr double kStraight = 1e-4;  // [m, rad] what a gentle acceleration does in a period
   const auto fits = [&](double scale) {
     const Vec6 v = scale * rate;  // that a braking motion would begin with
@@ -110,7 +123,15 @@ void AdmittanceControl::slowInsideEnvelope(const Vec6& last, const Vec6& L,
     (fits(middle) ? low : high) = middle;
   }
   scale_ = low;
-  model_.slow(low);
+  if (!frame_.enabled()) {
+    model_.slow(low);
+    shown_ = model_.motion();
+    return;
+  }
+  shown_.x = last + low * step;
+  shown_.x_dot = low * rate;
+  shown_.x_ddot = (shown_.x_dot - from.x_dot) / period_;
+  frame_.yield(model_.bodyMotion(), shown_);
 }
 
 }  // namespace ves

@@ -138,12 +138,9 @@ Wrench AidedWrench::update(const Input& in, bool engaged) noexcept {
   closed_ = withholds_ ? closed_ + 1 : 0;
   passing_ = closed_ <= hold_ ? passing_ + 1 : 0;
   lesson_.passing = passing_ > 0;
-  if (!withholds_) {
-    lesson_.passed = beyond;
-    return in.measured;
-  }
-  lesson_.withheld = beyond;
-  return in.measured - beyond;
+  (withholds_ ? lesson_.withheld : lesson_.passed) =
+      in.emulated.flies ? rotate(in.emulated.R_EI, beyond) : beyond;
+  return withholds_ ? in.measured - beyond : in.measured;
 }
 
 /// A calibration measures bias and weight together: what it read beyond the weight then believed

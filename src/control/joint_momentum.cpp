@@ -61,7 +61,7 @@ void JointMomentum::reset(const JointVector& q) noexcept {
   begun_ = false;
   q_ = q;
   shown_q_dot_.setZero();
-  force_ = {};
+  I_.force = E_.force = {};
 }
 
 JointVector JointMomentum::at(const Sample& sample) const noexcept {
@@ -72,7 +72,7 @@ JointVector JointMomentum::at(const Sample& sample) const noexcept {
 }
 
 void JointMomentum::update(const KnownPayload& known, const Sample& sample, const Mat3& R_IP,
-                           double since) noexcept {
+                           const Mat3& R_EP, double since) noexcept {
   if (known.changed() && known_ == 3 && aided_) relearn(known);
   if (!(since > 0.0)) return;
   if (known_ > 0 && sample.joints_time < last_[2].time) reset(sample.q);
@@ -93,11 +93,16 @@ void JointMomentum::update(const KnownPayload& known, const Sample& sample, cons
   shown_q_dot_ = at.rate().head<kMaxJoints>().matrix();
   if (!aided_) return;
   X_PL0_ = known.payload().X_PL0();
-  R_IP_ = R_IP;
-  const Vec6 before = momentum_, begin = momentum(filtered(time + begin_).output()),
-             end = momentum(filtered(time + end_).output());
-  momentum_ = momentum(now);
-  force_ = begun_ ? Wrench::from((before - momentum_) / since) : Wrench{};
+  const auto see = [&](Seen& seen, const Mat3& R) {
+    const Vec6 before = seen.momentum;
+    seen.R = R;
+    seen.momentum = momentum(R, now);
+    seen.force = begun_ ? Wrench::from((before - seen.momentum) / since) : Wrench{};
+  };
+  see(I_, R_IP);
+  see(E_, R_EP);
+  const Vec6 begin = momentum(R_IP, filtered(time + begin_).output()),
+             end = momentum(R_IP, filtered(time + end_).output());
   begun_ = true;
   shown_ = (begin - end) / seconds(begin_, end_);
   mean_ = 0.5 * (begin + end);
@@ -137,7 +142,8 @@ void JointMomentum::relearn(const KnownPayload& known) noexcept {
   input_ += input;
   rate_ += input_rate;
   chord_ += input_rate;
-  momentum_ += momentum(change(q_, shown_q_dot_));
+  const Channels more = change(q_, shown_q_dot_);
+  for (Seen* seen : {&I_, &E_}) seen->momentum += momentum(seen->R, more);
 }
 
 /// Where the middle one of the last three angles was read.
@@ -205,10 +211,10 @@ JointMomentum::Filter JointMomentum::filtered(std::int64_t time) const noexcept 
   return at;
 }
 
-/// About Po in I.
-Vec6 JointMomentum::momentum(const Channels& filtered) const noexcept {
+/// About Po in a frame that R turns the platform's axes to.
+Vec6 JointMomentum::momentum(const Mat3& R, const Channels& filtered) const noexcept {
   const Wrench of_L0 = Wrench::from(filtered.tail<6>().matrix());
-  return rotate(R_IP_, transfer(X_PL0_, of_L0)).stacked();
+  return rotate(R, transfer(X_PL0_, of_L0)).stacked();
 }
 
 }  // namespace ves

@@ -11,7 +11,9 @@ void MotionGenerator::begin(const Segment& segment, std::int64_t tick, const Mat
   segment_ = segment;
   follow(planned(segment));
   start_tick_ = tick;
-  if (segment.kind == SegmentKind::kAdmittance) admittance_.begin(motion_.x, M_1, age, share);
+  if (segment.kind != SegmentKind::kAdmittance) return;
+  admittance_.begin(motion_.x, M_1, age, share);
+  emulates_ = true;
 }
 
 void MotionGenerator::brake(const Braking& braking) noexcept {
@@ -28,6 +30,7 @@ void MotionGenerator::goHome() noexcept {
 
 /// From where and when the motion was meant; at rest it may as well be now.
 void MotionGenerator::follow(const MotionPlan& plan) noexcept {
+  endEmulation();
   plan_ = plan;
   n_ = 0;
   ahead_ = moving() ? motion_.ahead : 0.0;
@@ -36,7 +39,7 @@ void MotionGenerator::follow(const MotionPlan& plan) noexcept {
 Waypoint<6> MotionGenerator::admittanceModel(const AdmittanceInput& in,
                                              const PathChecks& checks) noexcept {
   ++n_;
-  return {admittance_.step(in, motion_.x, checks), settings_.period};
+  return {admittance_.step(in, motion_, checks), settings_.period};
 }
 
 Waypoint<6> MotionGenerator::trajectoryGeneration() noexcept {
@@ -61,6 +64,12 @@ void MotionGenerator::commit(const Waypoint<6>& x) noexcept {
 void MotionGenerator::hold() noexcept {
   motion_ = {atRest(motion_.x)};
   admittance_.forget();
+  endEmulation();
+}
+
+void MotionGenerator::endEmulation() noexcept {
+  emulates_ = false;
+  admittance_.end();
 }
 
 bool MotionGenerator::over(std::int64_t tick) const noexcept {

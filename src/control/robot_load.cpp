@@ -93,8 +93,8 @@ RobotInertia::RobotInertia(const ControllerConfig& config)
       geometry_(config.geometry) {}
 
 Wrench RobotInertia::update(const KnownPayload& known, std::int64_t count, const JointVector& q,
-                            double since, const Transform& X_IP, const LegMotion& legs,
-                            bool engaged, double share) noexcept {
+                            double since, const Transform& X_IP, const Mat3& R_EP,
+                            const LegMotion& legs, bool engaged, double share) noexcept {
   if (!compensated_ || !engaged) {
     known_ = false;
     platform_ = {};
@@ -104,9 +104,14 @@ Wrench RobotInertia::update(const KnownPayload& known, std::int64_t count, const
   const auto compositeAt = [&](const JointVector& at) {
     return combine(RigidBody{}, known.payload().X_PL0(), compositeBody(known.carried(), at));
   };
+  const auto seen = [&](const Mat3& R, const RigidBody& composite_P) -> Seen {
+    return {scale_ * spatialMass(rotated(R, composite_P)), R};
+  };
+  const bool flies = R_EP != X_IP.R;
   if (other) {  // which has moved as before: its momentum loses nothing on the way
-    whole_ = scale_ * spatialMass(rotated(R_IP_, compositeAt(composite_q_)));
-    whole_before_ = whole_;
+    const RigidBody then = compositeAt(composite_q_);
+    I_ = I_before_ = seen(I_.R, then);
+    E_ = E_before_ = seen(E_.R, then);
   }
   if (first || other || count % mass_update_ == 0) {
     composite_P_ = compositeAt(q);
@@ -114,23 +119,23 @@ Wrench RobotInertia::update(const KnownPayload& known, std::int64_t count, const
   }
   known_ = true;
   if (first || since > 0.0) {
-    whole_before_ = whole_;
-    R_IP_before_ = R_IP_;
-    whole_ = scale_ * spatialMass(rotated(X_IP.R, composite_P_));
-    R_IP_ = X_IP.R;
+    I_before_ = I_;
+    E_before_ = E_;
+    I_ = seen(X_IP.R, composite_P_);
+    E_ = flies ? seen(R_EP, composite_P_) : I_;
     if (first) {
-      whole_before_ = whole_;
-      R_IP_before_ = R_IP_;
+      I_before_ = I_;
+      E_before_ = E_;
     }
     since_ = since;
   }
-  M_1_ = share * whole_;
-  before_ = share * whole_before_;
+  share_ = share;
+  M_1_ = share * I_.whole;
   BodyMotion P;
   if (!forwardMotion(geometry_, X_IP, legs, P)) return {};
   platform_ = P;
   Vec6 momentum_rate = M_1_ * (Vec6() << P.a, P.alpha).finished();
-  if (since_ > 0.0) momentum_rate += (M_1_ - before_).rightCols<3>() * P.w / since_;
+  if (since_ > 0.0) momentum_rate += (M_1_ - share * I_before_.whole).rightCols<3>() * P.w / since_;
   return Wrench::from(momentum_rate);
 }
 

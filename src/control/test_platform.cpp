@@ -35,25 +35,27 @@ const TickState& TestPlatform::tick(const TickInput& in) noexcept {
   if (samples_.fresh()) known_.readGripper(sample.switches);
   known_.update(elapsed, commander_.command().segment);
   if (!engaged) joints_.reset(sample.q);
-  joints_.update(known_, sample, X_IP.R, engaged ? samples_.wrench().since : 0.0);
+  Wrenches W;
+  const Emulated& emulated = W.emulated = motion_.emulated(X_IP.R, samples_.wrench().since);
+  joints_.update(known_, sample, X_IP.R, emulated.R_EP, engaged ? samples_.wrench().since : 0.0);
   load_.update(known_, joints_.at(sample), X_IP.R, samples_.wrench().since, engaged,
                share_.value());
   bias_.stepTare(sample, samples_.fresh(), load_.counts());
   // The measured attitude: the commanded one leads it by the servo's lag, and the difference would
   // pass as a wrench of the robot's weight.
-  Wrenches W;
   W.total = forceMeasurement(config_.sensor, bias_.counts(), sample.adc, X_IP.R);  // (C.1)
   W.static_wrench = gravityCompensation(config_.payload, X_IP.R, load_.wrench());  // (B.4)
   W.inertial = robot_.update(known_, elapsed.count, joints_.q(), samples_.wrench().since, X_IP,
-                             legs_.feltMotion(), engaged, share_.value());
+                             emulated.R_EP, legs_.feltMotion(), engaged, share_.value());
   const Wrench measured = W.total - W.static_wrench + W.inertial;
   W.felt = aided_.update({measured, W.static_wrench, known_.carried(), robot_, joints_, samples_,
-                          bias_, X_IP, share_.value(), known_.gripperMoved()},
+                          bias_, X_IP, emulated, share_.value(), known_.gripperMoved()},
                          engaged);
   if (aided_.taught()) {
     known_.learn(aided_.robot());
     bias_.learn(aided_.belief().bias());
   }
+  if (emulated.flies) W.felt = inE(emulated, W.felt);
   if (!engaged) filter_.reset();
   W.dynamic = filter_.update(W.felt);
   safety_.watch(elapsed, samples_, load_.counts());
@@ -84,6 +86,12 @@ const TickState& TestPlatform::tick(const TickInput& in) noexcept {
   return report(in, W);
 }
 
+/// F_Po_E of what is felt in the laboratory: the joints' momentum is emulated to change in E.
+Wrench TestPlatform::inE(const Emulated& emulated, const Wrench& F_Po_I) const noexcept {
+  const Wrench beyond = joints_.emulatedForce() - rotate(emulated.R_EI, joints_.force());
+  return rotate(emulated.R_EI, F_Po_I) + Wrench::from(share_.value() * beyond.stacked());
+}
+
 /// The admittance model (C.2) to (C.7), trajectory generation (C.8) to (C.10), or rest.
 Waypoint<6> TestPlatform::nextMotion(const Wrenches& W) noexcept {
   const Sample& sample = samples_.sample();
@@ -92,12 +100,13 @@ Waypoint<6> TestPlatform::nextMotion(const Wrenches& W) noexcept {
     bias_.calibrate(sample, samples_.fresh(), load_.counts());
   if (supervisor_.runs(motion_, SegmentKind::kAdmittance)) {
     const Transform& X_IP = legs_.measured().X_IP;
-    const Mat6 noise = aided_.withholds()
-                           ? Mat6(Mat6::Zero())
-                           : filter_.noise(wrenchNoise(config_.sensor, bias_.noise(), X_IP.R));
+    const Mat6 noise =
+        aided_.withholds()
+            ? Mat6(Mat6::Zero())
+            : filter_.noise(wrenchNoise(config_.sensor, bias_.noise(), W.emulated.R_EP));
     return motion_.admittanceModel(
         {W.dynamic, W.felt, noise, robot_.carried(), share_.value(), samples_.wrench(),
-         aided_.lesson(), sample.q, commander_.legs().L, X_IP, legs_.servo()},
+         !aided_.withholds(), aided_.lesson(), sample.q, commander_.legs().L, X_IP, legs_.servo()},
         safety_.path());
   }
   if (supervisor_.moves()) return motion_.trajectoryGeneration();
@@ -120,18 +129,20 @@ Checked TestPlatform::safetyChecks(const Proposal& next, const Wrench& dynamic,
 }
 
 void TestPlatform::legCommunication(const Checked& next) noexcept {
+  const MovingFrame& frame = motion_.admittance().frame();
   if (supervisor_.stopped() || !(supervisor_.disarmed() || next.passes())) {
     motion_.hold();
     commander_.hold();
     // They are where their watchdog took them: to hold where they were would be a leap.
     if (next.tripped().has(Check::kLeftAlone)) commander_.release({legs_.measured().L});
-    return;
+  } else {
+    motion_.commit(next.proposal().x);
+    if (supervisor_.disarmed())
+      commander_.release(next.proposal().legs);
+    else
+      commander_.send(next, supervisor_.segment(), share_.value(), legs_.servo(), legs_.age(time_));
   }
-  motion_.commit(next.proposal().x);
-  if (supervisor_.disarmed())
-    commander_.release(next.proposal().legs);
-  else
-    commander_.send(next, supervisor_.segment(), share_.value(), legs_.servo(), legs_.age(time_));
+  if (frame.enabled()) commander_.fly({time_ + config_.period, frame.laboratory()});
 }
 
 const TickState& TestPlatform::report(const TickInput& in, const Wrenches& W) noexcept {

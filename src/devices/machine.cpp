@@ -43,7 +43,7 @@ Machine::Machine(const Experiment& experiment, Bus& bus)
 }
 
 void Machine::command(const LegCommand& command) noexcept {
-  simulation_.plant().command(command);
+  simulation_.command(command);
   if (real_legs_) real_legs_->command(command);
 }
 

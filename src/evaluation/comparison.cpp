@@ -36,6 +36,43 @@ void eachTick(const Series& series, const std::function<void(const Row&, double)
   }
 }
 
+namespace {
+
+/// In the laboratory at a time [ns].
+PathPoint<6> shownIn(const Laboratory& lab, std::int64_t time, const Vec6& x, const Vec6& x_dot) {
+  const BodyMotion E_P = bodyMotion(Vec3::Zero(), Pose::from(x), x_dot, Vec6::Zero());
+  return coordinates(relative(lab.at(time), E_P));
+}
+
+/// A motion in E from the first tick on, as the laboratory that flew in the run would have shown
+/// it.
+Motion shown(const Series& series, Motion motion) {
+  const std::int64_t period = series.experiment.controller.period;
+  std::vector<const Row*> rows;
+  eachTick(series, [&](const Row& row, double) { rows.push_back(&row); });
+  if (rows.empty()) return motion;
+  const std::int64_t first = rows.front()->state.header.sequence;
+  std::size_t row = 0;
+  for (std::size_t k = 0; k < motion.x.size(); ++k) {
+    const std::int64_t tick = first + static_cast<std::int64_t>(k);
+    while (row + 1 < rows.size() && rows[row + 1]->state.header.sequence <= tick) ++row;
+    const state_t& s = rows[row]->state;
+    const std::int64_t time = s.machine_time_ns + (tick - s.header.sequence) * period;
+    const Vec6 x_dot = motion.x_dot.empty() ? Vec6(Vec6::Zero()) : motion.x_dot[k];
+    const PathPoint<6> there = shownIn(laboratoryOf(s), time, motion.x[k], x_dot);
+    motion.x[k] = there.x;
+    if (!motion.x_dot.empty()) motion.x_dot[k] = there.x_dot;
+  }
+  return motion;
+}
+
+}  // namespace
+
+Vec6 shownAt(const state_t& state, const Vec6& x) noexcept {
+  const Laboratory lab = laboratoryOf(state);
+  return lab.flies() ? shownIn(lab, state.machine_time_ns, x, Vec6::Zero()).x : x;
+}
+
 Motion commanded(const Series& series) {
   const double period =
       static_cast<double>(series.experiment.controller.period) * kSecondPerNanosecond;
@@ -125,6 +162,8 @@ std::string whyNotCompared(const Series& series) {
   if (!std::all_of(series.rows.begin(), series.rows.end(),
                    [](const Row& row) { return ofConfiguredVehicle(row.state); }))
     return "the vehicle was changed on the way";
+  if (series.experiment.controller.moving_frame.enabled && !pushesOf(series).empty())
+    return "it was pushed in a laboratory that flies along";
   return "";
 }
 
@@ -159,7 +198,7 @@ std::optional<Emulation> emulation(const Series& series, ReferenceMotions& refer
   const std::vector<TimedAction> pushes = pushesOf(series);
   const auto base = baseMotion(series.experiment, commanded(series).x.front(), references, &pushes);
   if (!base) return {};
-  out.base = *base;
+  out.base = series.experiment.controller.moving_frame.enabled ? shown(series, *base) : *base;
   return out;
 }
 

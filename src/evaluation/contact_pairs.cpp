@@ -132,7 +132,8 @@ std::vector<ContactPair> contactPairs(const Series& series, const std::optional<
   std::vector<ContactPair> out(std::max(emulated.size(), free_space.size()));
   for (std::size_t i = 0; i < emulated.size(); ++i) out[i].emulated = emulated[i];
   for (std::size_t i = 0; i < free_space.size(); ++i) out[i].free_space = free_space[i];
-  if (out.empty() || !e) return out;
+  // Poses in a laboratory that flies say nothing of the energy.
+  if (out.empty() || !e || series.experiment.controller.moving_frame.enabled) return out;
   const Ticks ticks(series, e->base);
   const auto next = [](const std::vector<Contact>& all, std::size_t i) {
     return i + 1 < all.size() ? all[i + 1].began : HUGE_VAL;

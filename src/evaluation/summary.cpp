@@ -197,6 +197,21 @@ std::string adviceOf(const ControllerConfig& c) {
   return "a mass or a load that is not as believed (--masses FILE, docs/identification.md)";
 }
 
+/// How far a vehicle was from where it was let go, and how much it turned, whichever way.
+void addFlight(const Series& series, nlohmann::ordered_json& out) {
+  std::optional<Transform> first, last;
+  double turned = 0.0;
+  eachTick(series, [&](const Row& row, double) {
+    const Transform X_EP = emulatedPose(row.state);
+    if (!first) first = X_EP;
+    if (last) turned += rotationVector(X_EP.R * last->R.transpose()).norm();
+    last = X_EP;
+  });
+  if (!last) return;
+  out["flown_m"] = (last->p - first->p).norm();
+  out["turned_rad"] = turned;
+}
+
 /// How far the platform was from the robot on its base in free space.
 void addEmulation(const Series& series, const std::optional<Emulation>& e,
                   nlohmann::ordered_json& out) {
@@ -207,9 +222,11 @@ void addEmulation(const Series& series, const std::optional<Emulation>& e,
   }
   const Distance error = distance(e->platform, e->base), moved = travel(e->base);
   const Amplitude most = amplitude(series.experiment, e->base);
+  const bool flies = series.experiment.controller.moving_frame.enabled;
   const auto share = [&](const char* key, double rms, double of) {
-    if (of > kMoved) out[key] = rms / of;
+    if (of > kMoved && !flies) out[key] = rms / of;  // of what is only shown of a flight
   };
+  if (flies) addFlight(series, out);
   out["emulation_amplitude_m"] = most.position;
   out["emulation_amplitude_rad"] = most.attitude;
   share("emulation_error_position_share", error.rms_position, most.position);

@@ -51,11 +51,15 @@ std::string table(const nlohmann::ordered_json& s) {
     out += fmt::format(
         "  emulation off by {:.3f} mm{} and {:.4f} deg{} rms,\n"
         "           at most {:.3f} mm and {:.4f} deg: beside the robot on its base in\n"
-        "           free space, which goes {:.3f} mm and {:.4f} deg from rest\n",
+        "           free space, which {} {:.3f} mm and {:.4f} deg from rest\n",
         number("emulation_error_rms_m") * 1e3, share("emulation_error_position_share"),
         number("emulation_error_rms_rad") / kDegree, share("emulation_error_attitude_share"),
         number("emulation_error_max_m") * 1e3, number("emulation_error_max_rad") / kDegree,
-        number("emulation_amplitude_m") * 1e3, number("emulation_amplitude_rad") / kDegree);
+        s.contains("flown_m") ? "is shown to go" : "goes", number("emulation_amplitude_m") * 1e3,
+        number("emulation_amplitude_rad") / kDegree);
+    if (s.contains("flown_m"))
+      out += fmt::format("           The laboratory flew along: {:.2f} m and {:.2f} turns\n",
+                         number("flown_m"), number("turned_rad") / (2.0 * M_PI));
     if (s.contains("emulation_advice"))
       out += fmt::format("           WARNING: more than 20 % off. Likeliest:\n           {}\n",
                          s["emulation_advice"].get<std::string>());

@@ -241,9 +241,12 @@ class McapExport::Impl {
     const JointVector q = JointVector::Map(row.has_truth ? row.truth.q : row.sample.q);
     std::vector<Stamped> moving = {{"inertial", "platform", X_IP}};
     robotFrames(q, true, "", moving);
+    const Transform X_EI = emulatedFrom(row.state);
+    if (laboratoryOf(row.state).flies()) moving.push_back({"emulated", "inertial", X_EI});
     if (const auto base =
             base_ ? base_->point(row.state.header.sequence - base_start_) : std::nullopt) {
-      moving.push_back({"inertial", "ghost/platform", geometry.fromHome(Pose::from(*base))});
+      moving.push_back(
+          {"inertial", "ghost/platform", geometry.fromHome(Pose::from(shownAt(row.state, *base)))});
       robotFrames(q, true, "ghost/", moving);
     }
     transforms(tf_, now, moving);
@@ -262,14 +265,22 @@ class McapExport::Impl {
 
     // Admittance control's input, in the axes of the frame that it is shown at.
     const Vec6 W = Vec6::Map(row.state.dynamic);
+    const Mat3 R_PE = (X_EI.R * X_IP.R).transpose();
     out_.write(wrench_, now,
                Cdr()
                    .header(now, "platform")
-                   .vector(X_IP.R.transpose() * W.head<3>())
-                   .vector(X_IP.R.transpose() * W.tail<3>())
+                   .vector(R_PE * W.head<3>())
+                   .vector(R_PE * W.tail<3>())
                    .bytes());
     legs(X_IP, now);
     words(row, now);
+  }
+
+  /// Of the laboratory where the vehicle is emulated, at the state's tick.
+  Transform emulatedFrom(const state_t& state) const {
+    const Vec3 home = experiment_.plant.geometry.home();
+    const Transform X_EH = laboratoryOf(state).at(state.machine_time_ns).X;
+    return {X_EH.R, home + X_EH.p - X_EH.R * home};
   }
 
   void legs(const Transform& X_IP, std::int64_t now) {

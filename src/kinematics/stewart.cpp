@@ -137,6 +137,17 @@ BodyMotion bodyMotion(const Vec3& p_IH, const Pose& x, const Vec6& x_dot,
   return P;
 }
 
+PathPoint<6> coordinates(const BodyMotion& P) noexcept {
+  const Vec3 rpy = fixedAngles(P.X.R);
+  const Mat3 to_rates = angleRateMap(rpy).inverse();
+  const Vec3 rpy_dot = to_rates * P.w;
+  PathPoint<6> out;
+  out.x << P.X.p, rpy;
+  out.x_dot << P.v, rpy_dot;
+  out.x_ddot << P.a, to_rates * (P.alpha - angleRateMapDerivative(rpy, rpy_dot) * rpy_dot);
+  return out;
+}
+
 ForwardSolution forwardPose(const Geometry& geometry, const Vec6& L,
                             const Transform& guess) noexcept {
   JacobianFactors factors;

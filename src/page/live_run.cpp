@@ -250,6 +250,7 @@ void LiveRun::keepPicture() {
   constexpr std::size_t kKept = 6000;  // [-] a minute at 100 Hz
   std::optional<Vec6> base;
   if (base_) base = base_->point(row_->state.header.sequence - let_go_->tick);
+  if (base) base = shownAt(row_->state, *base);
   Picture one{newest_, row_->state.header.time_ns, rate_, scene_->picture(*row_, base)};
   // 0: nothing asked, 1: not answered yet, 2: answered, and how, 3: no answer came
   const auto tell = [&](const std::optional<Asked>& asked) {

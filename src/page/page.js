@@ -29,6 +29,7 @@ function begin(recordings) {
   const b = bodies[0].frames, [edge, twin] = bodies[0].edges, named = [['platform', edge], ['base in free space', twin, 'ghost']];
   if (b.tool) named.push(['tool', b.tool]);
   if (b.target) named.push(['target', b.target]);
+  if (b.compass) named.push(['axes of the flight', b.compass]);
   stage.label(named);
   document.title = first.scene.name;
   element('seek').max = Math.max(0, first.count - 1);
@@ -50,6 +51,8 @@ function show(i) {
   const lines = [`${phase}${phase === 'running' && kind ? ': ' + kind : ''}${segment >= 0 && segment < first.scene.segments.length ? ` (${segment + 1} of ${first.scene.segments.length})` : ''}`];
   if (cause) lines.push(`stopped by: ${cause}`);
   if (live) lines.push(...live.lines(shown));
+  if (bodies[0].frames.compass)
+    lines.push(`the laboratory flies along: ${first.scalar(shown, 'flown').toFixed(2)} m from its start, turning at ${first.scalar(shown, 'turns_at').toFixed(1)} deg/s`);
   const arrows = Object.keys(ARROWS).filter(name => bodies[0].arrows[name].visible);
   if (arrows.length) lines.push(`${arrows.join(', ')}: 1 m is ${newtonsPerMetre < 10 ? newtonsPerMetre.toFixed(1) : Math.round(newtonsPerMetre)} N`);
   if (how.times > 1) lines.push(`every motion times ${how.times}`);

@@ -80,7 +80,8 @@ Scene::Scene(const Experiment& e)
       size_(jointRadius(geometry_) / kJointRadius),
       payload_(e.plant.payload),
       arm_(e.arm.value_or(ArmShape())),
-      Phi_(linearised(e.controller.vehicle).Phi) {
+      Phi_(linearised(e.controller.vehicle).Phi),
+      flies_(e.controller.moving_frame.enabled) {
   if (e.robot.tool()) tool_ = *e.robot.tool();
   description_ = {{"name", e.name},
                   {"description", e.description},
@@ -115,6 +116,7 @@ Scene::Scene(const Experiment& e)
                     {"radius", 0.08 * carriedSize()},
                     {"length", payload_.X_PS.p.z()}});
   if (!e.robot.frames.empty()) addRobot(e.robot);
+  if (flies_) addEmulated();
   if (e.plant.task.world) addWorld(e.plant.task.world->environment);
   addArm();
 
@@ -130,8 +132,18 @@ Scene::Scene(const Experiment& e)
   const bool waits = calibrates(program);
   for (int i = 0; i < 3; ++i)
     add(fmt::format("{}_dynamic", wrenchComponent(i).name), [i, waits](const Row& r) {
-      return calibrated(r.state) || !waits ? r.state.dynamic[i] : NAN;
+      if (!calibrated(r.state) && waits) return static_cast<double>(NAN);
+      const Vec3 f_E = Vec3::Map(r.state.dynamic);
+      return (laboratoryOf(r.state).E_H.X.R.transpose() * f_E)(i);
     });
+  if (flies_) {
+    add("flown", [](const Row& r) { return emulatedPose(r.state).p.norm(); });
+    add("turns_at", [](const Row& r) {
+      const Pose x = Pose::from(Vec6::Map(r.state.x));
+      const BodyMotion shown = bodyMotion(Vec3::Zero(), x, Vec6::Map(r.state.x_dot), Vec6::Zero());
+      return composed(laboratoryOf(r.state).E_H, shown).w.norm() / kDegree;
+    });
+  }
   const SafetyLimits limits = e.controller.safety;
   for (int i = 0; i < kLegs; ++i)  // 1 in the middle of the stroke, 0 at a limit
     add(fmt::format("leg{}_margin", i + 1), [i, limits](const Row& r) {
@@ -179,6 +191,16 @@ Scene::Scene(const Experiment& e)
   description_["kinds"] = kinds;
   description_["checks"] = checks;
 }
+
+/// The frame in which the vehicle is emulated, as the laboratory flies through it; and its axes
+/// where they can be seen.
+void Scene::addEmulated() {
+  addFrame("emulated", "");
+  addFrame("compass", "");
+  description_["shapes"].push_back({{"kind", "axes"}, {"frame", "compass"}, {"size", 0.3 * size_}});
+}
+
+Vec3 Scene::compass() const { return Vec3(-1.1 * size_, 0.0, geometry_.home_height); }
 
 void Scene::addFrame(const std::string& name, const std::string& parent) {
   frames_.push_back(name);
@@ -328,10 +350,11 @@ void Scene::addWorld(const Environment& environment) {
       box({kShown, kShown, kThick}, {0.0, 0.0, -0.5 * kThick});
     }
   };
-  for (const FixedBody& body : environment.bodies) add("", body.X_IB, body.shape);
+  for (const FixedBody& body : environment.bodies)
+    add(flies_ ? "emulated" : "", body.X_IB, body.shape);
   if (!environment.target) return;
   target_ = environment.target->start;
-  addFrame("target", "");
+  addFrame("target", flies_ ? "emulated" : "");
   add("target", Transform(), environment.target->shape);
 }
 
@@ -367,6 +390,12 @@ std::vector<float> Scene::picture(const Row& row, const std::optional<Vec6>& bas
   const Transform X_PL0 = payload_.X_PL0();
   for (int i = 0; i < payload_.robot.size; ++i) put(X_PL0 * X_L0L[i]);
   if (tool_) put(X_PL0 * tool_->pose(X_L0L));
+  if (flies_) {
+    const Vec3 home = geometry_.home();
+    const Transform X_HE = inverse(laboratoryOf(row.state).at(row.state.machine_time_ns).X);
+    put({X_HE.R, home + X_HE.p - X_HE.R * home});
+    put({X_HE.R, compass()});
+  }
   if (target_ && row.has_truth) {
     Floating target;
     target.p = Vec3::Map(row.truth.target_p);

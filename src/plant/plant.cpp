@@ -85,6 +85,7 @@ Plant::Plant(const PlantConfig& config)
 
 void Plant::command(const LegCommand& command) noexcept {
   watchdog_.take(command, now_);
+  if (command.laboratory.flies()) laboratory_ = command.laboratory;
   if (!command.engaged) return;
   if (command.segment < 0) {  // an operator's order: what the program began goes on
     outside_ = true;
@@ -300,8 +301,18 @@ Wrench Plant::sensorLoad() noexcept {
   return transfer(X_SL0_, Wrench{} - wrenchOnRobot(felt));
 }
 
+/// The platform where the world is.
+BodyMotion Plant::emulated() const noexcept {
+  if (!laboratory_.flies()) return truth_.P;
+  BodyMotion P = truth_.P;
+  P.X.p -= config_.geometry.home();
+  P = composed(laboratory_.at(now_), P);
+  P.X.p += config_.geometry.home();
+  return P;
+}
+
 FrameMotion Plant::toolMotion() const noexcept {
-  return carriedFrame(robot_.model(), truth_.joints, truth_.P, config_.payload.X_PL0(),
+  return carriedFrame(robot_.model(), truth_.joints, emulated(), config_.payload.X_PL0(),
                       config_.task.world->link, config_.task.world->X_link);
 }
 
@@ -342,10 +353,12 @@ Wrench Plant::meetWorld(double dt) noexcept {
                                   kContactStep, target, truth_.contacts);
   if (!held) truth_.target = target;
   tool_ = now;
-  truth_.contact_To_I = mean.on_tool_To_I;
+  const Transform X_EP = emulated().X, X_ES = X_EP * config_.payload.X_PS;
+  truth_.contact_To_I = laboratory_.flies()
+                            ? rotate(truth_.P.X.R * X_EP.R.transpose(), mean.on_tool_To_I)
+                            : mean.on_tool_To_I;
   truth_.clearance = mean.least;
-  const Transform X_IS = truth_.P.X * config_.payload.X_PS;
-  return rotate(X_IS.R.transpose(), shift(mean.on_tool_To_I, X_IS.p - now.X.p));
+  return rotate(X_ES.R.transpose(), shift(mean.on_tool_To_I, X_ES.p - now.X.p));
 }
 
 /// The push's mean since `from` [ns], in {I}: about Po, or about the centre of what floats.

@@ -33,6 +33,15 @@ Mat6 spatialMass(const RigidBody& body) noexcept {
   return M;
 }
 
+Mat6 rotated(const Mat3& R_AB, const Mat6& M_B) noexcept {
+  Mat6 out;
+  for (int i = 0; i < 6; i += 3)
+    for (int j = 0; j < 6; j += 3)
+      out.block<3, 3>(i, j) =
+          R_AB.lazyProduct(M_B.block<3, 3>(i, j)).eval().lazyProduct(R_AB.transpose());
+  return out;
+}
+
 void RobotModel::add(const Link& link, bool follows) {
   const auto k = static_cast<std::size_t>(size++);
   links[k] = link;

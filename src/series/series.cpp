@@ -14,6 +14,7 @@
 #include "ves/bus/channels.hpp"
 #include "ves/bus/fields.hpp"
 #include "ves/bus/ordered_log.hpp"
+#include "ves/contract/schema.hpp"
 #include "ves/core/coordinates.hpp"
 
 namespace ves {
@@ -187,6 +188,8 @@ std::pair<std::string, std::string> part(schema::Along along, std::string_view u
     case kBodyAxes:
       return {fmt::format("{}_{}", bodies[static_cast<std::size_t>(i / 3)].name, "xyz"[i % 3]),
               ending(unit)};
+    case kAxes: return {std::string(1, "xyz"[i]), ending(unit)};
+    case kTurn: return {fmt::format("r{}{}", i / 3 + 1, i % 3 + 1), ""};
     default: return {fmt::format("leg{}", i + 1), ending(own)};
   }
 }
@@ -201,6 +204,9 @@ void addState(const Experiment& e, std::vector<Column>& out) {
     if (!e.controller.compensation.learns_masses)
       h.insert(
           {"learnt_mass", "learnt_mass_deviation", "learnt_moment", "learnt_moment_deviation"});
+    if (!e.controller.moving_frame.enabled)
+      h.insert({"laboratory_time_ns", "laboratory_p", "laboratory_R", "laboratory_v",
+                "laboratory_w", "laboratory_a", "laboratory_alpha"});
     return h;
   }();
   const std::vector<LearntBody> bodies = learntBodies(e);
@@ -214,8 +220,8 @@ void addState(const Experiment& e, std::vector<Column>& out) {
     const auto read = [offset](const Row& r) -> const M& {
       return *reinterpret_cast<const M*>(reinterpret_cast<const char*>(&r.state) + offset);
     };
+    if (hidden.contains(field.name)) return;
     if constexpr (std::is_array_v<M>) {
-      if (hidden.contains(field.name)) return;
       const bool of_bodies = field.along == schema::Along::kBodies;
       const int size = of_bodies ? static_cast<int>(bodies.size())
                        : field.along == schema::Along::kBodyAxes
@@ -223,7 +229,7 @@ void addState(const Experiment& e, std::vector<Column>& out) {
                            : static_cast<int>(std::extent_v<M>);
       for (int i = 0; i < size; ++i) {
         const auto [name, unit] = part(field.along, field.unit, i, bodies);
-        out.push_back({fmt::format("{}_{}_{}", name, field.column, unit),
+        out.push_back({fmt::format("{}_{}{}{}", name, field.column, unit.empty() ? "" : "_", unit),
                        [=](const Row& r) { return static_cast<double>(read(r)[i]); },
                        field.meaning,
                        {}});
@@ -249,6 +255,23 @@ void addState(const Experiment& e, std::vector<Column>& out) {
 }
 
 }  // namespace
+
+Laboratory laboratoryOf(const state_t& state) noexcept {
+  Laboratory lab;
+  lab.time = state.laboratory_time_ns;
+  lab.E_H.X.p = Vec3::Map(state.laboratory_p);
+  schema::take(state.laboratory_R, lab.E_H.X.R);
+  lab.E_H.v = Vec3::Map(state.laboratory_v);
+  lab.E_H.w = Vec3::Map(state.laboratory_w);
+  lab.E_H.a = Vec3::Map(state.laboratory_a);
+  lab.E_H.alpha = Vec3::Map(state.laboratory_alpha);
+  return lab;
+}
+
+Transform emulatedPose(const state_t& state) noexcept {
+  const Pose x = Pose::from(Vec6::Map(state.x));
+  return laboratoryOf(state).E_H.X * Transform{rotation(x.rpy), x.p};
+}
 
 Transform toolPose(const Experiment& experiment, const Vec6& x, const JointVector& q) {
   const plant::PlantConfig& plant = experiment.plant;
@@ -294,6 +317,18 @@ std::vector<Column> columns(const Experiment& experiment) {
       "tick", [](const Row& r) { return static_cast<double>(r.state.header.sequence); },
       "of the controller");
   addState(experiment, out);
+  if (experiment.controller.moving_frame.enabled) {
+    for (int i = 0; i < 3; ++i)
+      add(
+          fmt::format("emulated_{}_m", "xyz"[i]),
+          [=](const Row& r) { return emulatedPose(r.state).p(i); },
+          "commanded, where the vehicle is emulated, from home");
+    for (int i = 0; i < 4; ++i)
+      add(
+          fmt::format("emulated_q{}", "xyzw"[i]),
+          [=](const Row& r) { return Eigen::Quaterniond(emulatedPose(r.state).R).coeffs()(i); },
+          "the same: its attitude, a quaternion");
+  }
   for (int i = 0; i < 6; ++i)
     add(
         fmt::format("{}_actual_{}", coordinate(i).name, coordinate(i).unit),

@@ -7,19 +7,10 @@
 #include <cmath>
 
 #include "ves/math/dense.hpp"
+#include "ves/math/relative_motion.hpp"
 
 namespace ves {
 namespace {
-
-/// A spatial mass, with its basis turned.
-Mat6 turned(const Mat3& R_AB, const Mat6& M_B) noexcept {
-  Mat6 out;
-  for (int i = 0; i < 6; i += 3)
-    for (int j = 0; j < 6; j += 3)
-      out.block<3, 3>(i, j) =
-          R_AB.lazyProduct(M_B.block<3, 3>(i, j)).eval().lazyProduct(R_AB.transpose());
-  return out;
-}
 
 /// The body of a spatial mass.
 struct Lumped {
@@ -41,20 +32,13 @@ Vec3 rotationRate(const Vec3& th, const Vec3& w) noexcept {
 Vec6 velocity(const RigidState& s) noexcept { return (Vec6() << s.v, s.w).finished(); }
 
 /// The same with the acceleration under F.
-PathPoint<6> motionOf(const Mat6& M_P, const RigidState& s, const Wrench& F_Po_I) noexcept {
+BodyMotion motionOf(const Mat6& M_P, const RigidState& s, const Wrench& F_Po_I) noexcept {
   const Lumped body(M_P);
   const Vec3 c = s.R_IP * body.center;
   const Mat3 J = s.R_IP * body.inertia * s.R_IP.transpose();
   const Vec3 alpha = J.inverse() * (F_Po_I.n - c.cross(F_Po_I.f) - s.w.cross(J * s.w));
   const Vec3 a = F_Po_I.f / body.mass - alpha.cross(c) - s.w.cross(s.w.cross(c));
-  PathPoint<6> out;
-  const Vec3 rpy = fixedAngles(s.R_IP);
-  const Mat3 to_rates = angleRateMap(rpy).inverse();
-  const Vec3 rpy_dot = to_rates * s.w;
-  out.x << s.p, rpy;
-  out.x_dot << s.v, rpy_dot;
-  out.x_ddot << a, to_rates * (alpha - angleRateMapDerivative(rpy, rpy_dot) * rpy_dot);
-  return out;
+  return {{s.R_IP, s.p}, s.v, s.w, a, alpha};
 }
 
 }  // namespace
@@ -113,8 +97,7 @@ RigidState advanced(const Mat6& M_P, const Mat6& M_then_P, const RigidState& fro
     shifted += mean(k1.shifted, k2.shifted, k3.shifted, k4.shifted);
     to.R_IP = rotationOf(mean(k1.th, k2.th, k3.th, k4.th)) * to.R_IP;
   }
-  // Orthogonal to rounding, by a step of Newton's.
-  to.R_IP = 0.5 * to.R_IP * (3.0 * Mat3::Identity() - to.R_IP.transpose() * to.R_IP);
+  to.R_IP = orthogonal(to.R_IP);
   const Vec3 c_last = to.R_IP * at_last.center;
   to.w = to.R_IP * (at_last.inertia.inverse() * (to.R_IP.transpose() * L));
   to.v = v_c + dt * a_c - to.w.cross(c_last);
@@ -126,14 +109,15 @@ FreeBody::FreeBody(const FreeBodyModel& model, double period)
     : model_(model),
       M_P_(spatialMass(model.body_P)),
       beside_({Mat6::Identity(), Vec6::Zero(), Mat6::Zero()}),
-      period_(period) {}
+      period_(period),
+      whole_P_(M_P_) {}
 
 void FreeBody::reset(const Vec6& x, const Mat6& M_1, double ahead) noexcept {
   RigidState& s = now_.rigid;
   s = {rotation(Vec3(x.tail<3>())), x.head<3>(), model_.v_IPo_I, model_.w_IP_I};
-  const Mat6 M_P = massInP() + turned(s.R_IP.transpose(), M_1);
+  const Mat6 M_P = massInP() + rotated(s.R_IP.transpose(), M_1);
+  whole_P_ = M_P;
   now_.motion = motionOf(M_P, s, {});
-  now_.motion.x = x;
   now_.time = ahead > 0.0 ? -ahead : 0.0;
   now_.pulses = {};
   if (ahead > 0.0 && !velocity(s).isZero(0.0)) s = advanced(M_P, M_P, s, {}, -ahead);
@@ -149,9 +133,9 @@ void FreeBody::step(const Wrench& F_Po_I, const CarriedBody& carried, double dt,
   dt_ = dt;
   const RigidState& from = before_.rigid;
   const Mat6 own = massInP(),
-             before = own + turned(carried.R_IP_before.transpose(), carried.before),
-             after = own + turned(carried.R_IP.transpose(), carried.M_1),
-             middle = turned(from.R_IP, 0.5 * (before + after));
+             before = own + rotated(carried.R_IP_before.transpose(), carried.before),
+             after = own + rotated(carried.R_IP.transpose(), carried.M_1),
+             middle = rotated(from.R_IP, 0.5 * (before + after));
   mobility_ = middle.inverse();
   damping_ = -damping * (middle * velocity(from));
   Wrench F = Wrench::from(F_Po_I.stacked() + damping_), F_ahead = F;
@@ -174,12 +158,23 @@ void FreeBody::step(const Wrench& F_Po_I, const CarriedBody& carried, double dt,
   const RigidState s = advanced(before, after, from, F, dt);
   way_ << s.p - from.p, rotationVector(s.R_IP * from.R_IP.transpose());
   now_.rigid = s;
+  whole_P_ = after;
   if (!(ahead > 0.0)) F_ahead = F;
   now_.motion = motionOf(after, advanced(after, after, s, F_ahead, ahead), F_ahead);
   if (damped() < 0.0) {
     now_ = before_;
     step(F_Po_I, carried, dt, ahead, 0.0);
   }
+}
+
+BodyMotion FreeBody::coasting() const noexcept {
+  const BodyMotion& m = now_.motion;
+  return motionOf(whole_P_, {m.X.R, m.X.p, m.v, m.w}, {});
+}
+
+BodyMotion FreeBody::atWrench() const noexcept {
+  const RigidState& s = now_.rigid;
+  return {{s.R_IP, s.p}, s.v, s.w, Vec3::Zero(), Vec3::Zero()};
 }
 
 double FreeBody::kineticEnergy() const noexcept {
@@ -190,37 +185,39 @@ double FreeBody::kineticEnergy() const noexcept {
 }
 
 ModalDynamics::Body FreeBody::body(const Mat6& M_1) const noexcept {
-  return beside_.body(turned(now_.rigid.R_IP, M_P_) + M_1 / factors_.mass - Mat6::Identity());
+  return beside_.body(rotated(now_.rigid.R_IP, M_P_) + M_1 / factors_.mass - Mat6::Identity());
 }
 
 void FreeBody::displace(const ModalDynamics::Modes& by) noexcept {
-  const auto moved = [&](RigidState& s) {
-    s.p += by.eta.head<3>();
-    s.R_IP = rotationOf(by.eta.tail<3>()) * s.R_IP;
-    s.v += by.eta_dot.head<3>();
-    s.w += by.eta_dot.tail<3>();
+  const auto moved = [&](Mat3& R, Vec3& p, Vec3& v, Vec3& w) {
+    p += by.eta.head<3>();
+    R = rotationOf(by.eta.tail<3>()) * R;
+    v += by.eta_dot.head<3>();
+    w += by.eta_dot.tail<3>();
   };
-  moved(now_.rigid);
-  PathPoint<6>& m = now_.motion;  // which may be ahead
-  const Mat3 to_rates = angleRateMap(m.x.tail<3>()).inverse();
-  m.x.head<3>() += by.eta.head<3>();
-  m.x.tail<3>() += to_rates * by.eta.tail<3>();
-  m.x_dot.head<3>() += by.eta_dot.head<3>();
-  m.x_dot.tail<3>() += to_rates * by.eta_dot.tail<3>();
+  RigidState& s = now_.rigid;
+  moved(s.R_IP, s.p, s.v, s.w);
+  BodyMotion& m = now_.motion;  // which may be ahead
+  moved(m.X.R, m.X.p, m.v, m.w);
 }
 
 void FreeBody::slow(double share) noexcept {
+  const auto back = [&](Mat3& R, Vec3& p, const Mat3& R_from, const Vec3& p_from) {
+    p = p_from + share * (p - p_from);
+    R = rotationOf(share * rotationVector(R * R_from.transpose())) * R_from;
+  };
   RigidState &s = now_.rigid, from = before_.rigid;
-  s.p = from.p + share * (s.p - from.p);
-  s.R_IP = rotationOf(share * rotationVector(s.R_IP * from.R_IP.transpose())) * from.R_IP;
+  back(s.R_IP, s.p, from.R_IP, from.p);
   s.v *= share;
   s.w *= share;
   now_.time = before_.time + share * (now_.time - before_.time);
   way_ *= share;
-  PathPoint<6>& motion = now_.motion;  // which may be ahead
-  motion.x = before_.motion.x + share * (motion.x - before_.motion.x);
-  motion.x_dot *= share;
-  motion.x_ddot = (motion.x_dot - before_.motion.x_dot) / period_;
+  BodyMotion& m = now_.motion;  // which may be ahead
+  back(m.X.R, m.X.p, before_.motion.X.R, before_.motion.X.p);
+  m.v *= share;
+  m.w *= share;
+  m.a = (m.v - before_.motion.v) / period_;
+  m.alpha = (m.w - before_.motion.w) / period_;
 }
 
 }  // namespace ves

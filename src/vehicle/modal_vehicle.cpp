@@ -6,6 +6,7 @@
 #include <cassert>
 #include <cmath>
 
+#include "ves/kinematics/stewart.hpp"
 #include "ves/math/dense.hpp"
 #include "ves/math/second_order.hpp"
 
@@ -369,6 +370,24 @@ PathPoint<6> ModalVehicle::at(const Modes& modes,
     out.x_ddot += ground.x_ddot;
   }
   return out;
+}
+
+BodyMotion ModalVehicle::bodyMotion() const noexcept {
+  const PathPoint<6>& m = now_.motion;
+  return ves::bodyMotion(Vec3::Zero(), Pose::from(m.x), m.x_dot, m.x_ddot);
+}
+
+BodyMotion ModalVehicle::coasting() const noexcept {
+  BodyMotion out = bodyMotion();
+  out.a = out.alpha = Vec3::Zero();
+  return out;
+}
+
+BodyMotion ModalVehicle::atWrench() const noexcept {
+  Vec6 x_dot = dynamics_.Phi() * now_.modes.eta_dot;
+  if (ground_.moves()) x_dot += now_.ground.x_dot;
+  return ves::bodyMotion(Vec3::Zero(), Pose::from(coordinates(now_.modes, now_.ground)), x_dot,
+                         Vec6::Zero());
 }
 
 void ModalVehicle::displace(const Modes& by) noexcept {

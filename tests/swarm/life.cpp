@@ -39,6 +39,8 @@ class Dice {
 struct Scenario {
   const char* name;
   bool robot, arm;  // has a robot; its base is the Shuttle's arm
+
+  bool floats() const { return std::string_view(name).starts_with("satellite"); }
 };
 constexpr Scenario kScenarios[] = {
     {"z_sine", false, false},
@@ -56,6 +58,7 @@ constexpr Scenario kScenarios[] = {
     {"contact_capture_puma", true, true},
     {"satellite_puma", true, false},
     {"satellite_hold", true, false},
+    {"satellite_tumbling", true, false},
     {"ship_arm", true, false},
     {"deck_puma", true, false},
 };
@@ -69,6 +72,7 @@ std::vector<std::string> drawSettings(Dice& dice, const Scenario& scenario) {
     if (dice.chance(p)) put(key, value);
   };
   const std::string c = "controller.compensation.";
+  bool aided = false, learns = false;
   if (dice.chance(0.7)) {
     put(c + "feed_forward", dice.chance(0.8) ? "true" : "false");
     const bool observer = dice.chance(0.7), inertia = observer && dice.chance(0.7);
@@ -76,12 +80,20 @@ std::vector<std::string> drawSettings(Dice& dice, const Scenario& scenario) {
     put(c + "inertia", inertia ? "true" : "false");
     put(c + "wrench", "raw");
     if (observer) maybe(0.3, c + "adaptation", "true");
-    if (inertia && dice.chance(0.4)) {
+    if (inertia && dice.chance(scenario.floats() ? 0.8 : 0.4)) {
+      aided = true;
       put(c + "wrench", "aided");
-      maybe(0.5, c + "learns_masses", "true");
+      learns = dice.chance(0.5);
+      if (learns) put(c + "learns_masses", "true");
     }
     if (inertia) maybe(0.3, c + "mass_update_ticks", std::to_string(dice.whole(2, 40)));
     maybe(0.5, c + "ramp_s", fmt::format("{:.2f}", std::exp(dice.between(-4.0, 1.6))));
+  }
+  if (scenario.floats()) {
+    const bool flies = aided && !learns && dice.chance(0.7);
+    put("controller.moving_frame.enabled", flies ? "true" : "false");
+    maybe(0.3, "controller.moving_frame.steady_in_contact", "true");
+    if (flies) maybe(0.3, "base.free.velocity_m_per_s", "[20, -3, 0]");
   }
   maybe(0.2, "controller.passivity.enabled", "true");
   if (dice.chance(0.3)) {

@@ -9,6 +9,7 @@
 #include <cstdint>
 
 #include "ves/kinematics/stewart.hpp"
+#include "ves/math/relative_motion.hpp"
 #include "ves/robot/robot_model.hpp"
 
 namespace ves {
@@ -52,6 +53,19 @@ struct Sample {
   }
 };
 
+/// How the laboratory flies through the frame E that the vehicle is emulated in
+/// (control/moving_frame.hpp).
+struct Laboratory {
+  std::int64_t time = 0;  // [ns] by the machine's clock, for which it is meant; 0: E is I
+  BodyMotion E_H;         // home in E, in E's axes
+
+  bool flies() const noexcept { return time != 0; }
+  /// At another time [ns].
+  BodyMotion at(std::int64_t t) const noexcept {
+    return later(E_H, static_cast<double>(t - time) * kSecondPerNanosecond);
+  }
+};
+
 /// Each field is described in contract/schema.hpp.
 struct LegCommand {
   std::int64_t machine = 0;
@@ -61,6 +75,7 @@ struct LegCommand {
   LegCounts counts{};
   LegCounts rest{};
   std::int64_t ahead = 0;
+  Laboratory laboratory;
 };
 
 }  // namespace ves

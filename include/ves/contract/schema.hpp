@@ -29,6 +29,8 @@ enum class Along {
   kJoints,
   kBodies,
   kBodyAxes,
+  kAxes,
+  kTurn,  // a rotation matrix, row by row
   kNumbers
 };
 
@@ -108,6 +110,20 @@ constexpr auto fields(S& s) {
             "the checked lengths: where the legs rest should no command follow", kLegs},
       Field{"ahead_ns", "ns", s.ahead,
             "after its tick, for which these are meant: 0, or a period in admittance control"},
+      Field{
+          "laboratory_time_ns", "ns", s.laboratory.time,
+          "by the machine's clock, for which what follows is meant; 0: the vehicle is emulated in "
+          "{I}"},
+      Field{"laboratory_p", "m", s.laboratory.E_H.X.p,
+            "of home in {E}, the frame that the vehicle is emulated in, from {E}'s own home",
+            kNumbers},
+      Field{"laboratory_R", "-", s.laboratory.E_H.X.R,
+            "row by row: turns coordinates of {I} into those of {E}", kNumbers},
+      Field{"laboratory_v", "m/s", s.laboratory.E_H.v, "of home through {E}, in its axes",
+            kNumbers},
+      Field{"laboratory_w", "rad/s", s.laboratory.E_H.w, "the same", kNumbers},
+      Field{"laboratory_a", "m/s^2", s.laboratory.E_H.a, "the same", kNumbers},
+      Field{"laboratory_alpha", "rad/s^2", s.laboratory.E_H.alpha, "the same", kNumbers},
   };
 }
 
@@ -235,7 +251,7 @@ constexpr auto fields(S& s) {
             kBodyAxes, "learnt_moment_deviation"},
       Field{"dynamic", "N, N m", s.dynamic,
             "total - static_wrench + inertial, behind dead band and low-pass: input of the "
-            "admittance model",
+            "admittance model, in the axes that it is emulated in",
             kWrench, "dynamic"},
       Field{"x", "m, rad", s.motion.x, "commanded x y z alpha beta gamma from home", kCoordinates,
             "commanded"},
@@ -289,6 +305,17 @@ constexpr auto fields(S& s) {
       Field{"rest", "count", s.command.rest, "the same", kLegs, "rest"},
       Field{"ahead_ns", "ns", s.command.ahead,
             "after this tick, for which x, leg and rest are meant"},
+      Field{"laboratory_time_ns", "ns", s.command.laboratory.time, "as in leg_command_t"},
+      Field{"laboratory_p", "m", s.command.laboratory.E_H.X.p, "the same", kAxes, "laboratory"},
+      Field{"laboratory_R", "-", s.command.laboratory.E_H.X.R, "the same", kTurn, "laboratory"},
+      Field{"laboratory_v", "m/s", s.command.laboratory.E_H.v, "the same", kAxes,
+            "laboratory_rate"},
+      Field{"laboratory_w", "rad/s", s.command.laboratory.E_H.w, "the same", kAxes,
+            "laboratory_rate"},
+      Field{"laboratory_a", "m/s^2", s.command.laboratory.E_H.a, "the same", kAxes,
+            "laboratory_acceleration"},
+      Field{"laboratory_alpha", "rad/s^2", s.command.laboratory.E_H.alpha, "the same", kAxes,
+            "laboratory_acceleration"},
       Field{"request_stability", "-", s.request_verdict.compensated,
             "of a request for another vehicle: what the stability check says of it"},
       Field{"request_stability_uncompensated", "-", s.request_verdict.uncompensated,
@@ -301,7 +328,7 @@ constexpr auto fields(S& s) {
   };
 }
 
-static_assert(members<Sample>() == 15 && members<LegCommand>() == 7 &&
+static_assert(members<Sample>() == 15 && members<LegCommand>() == 8 &&
                   members<MachineSetup>() == 17 && members<TickState>() == 52 &&
                   members<Order>() == 6 && members<VehicleOrder>() == 2 &&
                   members<VehicleFactors>() == 3 && members<VehicleVerdict>() == 2 &&

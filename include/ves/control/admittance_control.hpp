@@ -7,6 +7,7 @@
 #include "ves/control/energy_account.hpp"
 #include "ves/control/hindsight.hpp"
 #include "ves/control/monitors.hpp"
+#include "ves/control/moving_frame.hpp"
 #include "ves/control/path_checks.hpp"
 #include "ves/control/tick_clock.hpp"
 #include "ves/control/vehicle_change.hpp"
@@ -15,12 +16,13 @@ namespace ves {
 
 /// What a step of admittance control is made of.
 struct AdmittanceInput {
-  const Wrench& F_Po_I;
-  const Wrench& at_port;       // F_Po_I before dead band and low-pass
-  const Mat6& noise;           // covariance of F_Po_I's noise (wrenchNoise)
+  const Wrench& F_Po_E;        // E is I where the laboratory rests
+  const Wrench& at_port;       // F_Po_E before dead band and low-pass
+  const Mat6& noise;           // covariance of F_Po_E's noise (wrenchNoise)
   const CarriedBody& body;     // the composite body that is compensated
   double share;                // [-] of the compensation
-  const WrenchTiming& wrench;  // when F_Po_I was read
+  const WrenchTiming& wrench;  // when F_Po_E was read
+  bool touches;                // something does, as far as that is known
   const Lesson& lesson;        // what was found out
   const JointVector& q;        // of the robot
   const Vec6& L;               // [m] lengths last commanded
@@ -32,16 +34,16 @@ class AdmittanceControl {
  public:
   explicit AdmittanceControl(const ControllerConfig& config);
 
-  /// At rest at x; M_1 is the composite body that is compensated, `age` [s] that of the wrench,
-  /// `share` [-] of the compensation that is in.
+  /// Shown at rest at x; M_1 is the composite body that is compensated, in I, `age` [s] that of the
+  /// wrench, `share` [-] of the compensation that is in.
   void begin(const Vec6& x, const Mat6& M_1, double age, double share) noexcept;
 
-  /// The coordinates one period on. `last` was commanded in the tick before. A wrench that is not
+  /// What to show one period on. `last` was commanded in the tick before. A wrench that is not
   /// finite leaves the model as it is: the finite check stops the run.
   ///
   /// With the inertia compensated the model goes from wrench to wrench, by their own times, and the
   /// command is what it foretells for the end of the period.
-  const PathPoint<6>& step(const AdmittanceInput& in, const Vec6& last,
+  const PathPoint<6>& step(const AdmittanceInput& in, const PathPoint<6>& last,
                            const PathChecks& checks) noexcept;
 
   /// Whether a vehicle with these factors can be stepped in a tick.
@@ -49,8 +51,16 @@ class AdmittanceControl {
   /// Another vehicle: by and by while this one is emulated, else at once.
   void change(const VehicleOrder& order, bool emulated) noexcept;
 
+  /// Nothing is emulated from now on: the laboratory rests where it is.
+  void end() noexcept { frame_.rest(); }
   /// The energy is watched from now on only.
   void forget() noexcept { oscillation_.reset(); }
+
+  const MovingFrame& frame() const noexcept { return frame_; }
+  /// How a platform turned by R_IP is emulated; `since` [s]: of a wrench after the last step's.
+  Emulated emulated(const Mat3& R_IP, double since) const noexcept {
+    return frame_.emulated(R_IP, model_.atWrench(), since);
+  }
 
   const Oscillation& oscillation() const noexcept { return oscillation_; }
   const EnergyAccount& energy() const noexcept { return energy_; }
@@ -59,9 +69,12 @@ class AdmittanceControl {
   double scale() const noexcept { return scale_; }  // [-] of the last step, 1: all of it was taken
 
  private:
-  void slowInsideEnvelope(const Vec6& last, const Vec6& L, const PathChecks& checks) noexcept;
+  void slowInsideEnvelope(const PathPoint<6>& last, const Vec6& L,
+                          const PathChecks& checks) noexcept;
 
   AdmittanceModel model_;
+  MovingFrame frame_;
+  PathPoint<6> shown_;
   Hindsight hindsight_;
   bool inertia_, aided_;  // compensated, what the model feels
   double wrench_delay_;   // [s]

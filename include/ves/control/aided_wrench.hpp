@@ -8,6 +8,7 @@
 #include "ves/control/hindsight.hpp"
 #include "ves/control/joint_momentum.hpp"
 #include "ves/control/mass_belief.hpp"
+#include "ves/control/moving_frame.hpp"
 #include "ves/control/sensor_bias.hpp"
 
 namespace ves {
@@ -68,6 +69,7 @@ class AidedWrench {
     const SampleStream& samples;
     const SensorBias& bias;
     const Transform& X_IP;
+    const Emulated& emulated;
     double share;  // [-] of the compensation
     bool gripper;  // has closed or opened: what is in the hand is not known any more
   };

@@ -41,6 +41,15 @@ struct Compensation {
   bool any() const noexcept { return feed_forward || observer; }
 };
 
+/// How the laboratory flies along with the vehicle (control/moving_frame.hpp).
+struct MovingFrameSettings {
+  bool enabled = false;
+  double share = 0.5;                           // [-] of the workspace that is used,
+  double acceleration = 0.02;                   // [m/s^2] to keep to it, at most
+  double angular_acceleration = 0.5 * kDegree;  // [rad/s^2]
+  bool steady_in_contact = false;               // none while something is felt
+};
+
 /// What keeps the emulation from giving energy (control/energy_account.hpp).
 struct Passivity {
   bool enabled = false;
@@ -115,6 +124,7 @@ struct ControllerConfig : Belief {
   std::int64_t period = 10'000'000;  // [ns]
   Compensation compensation;
   Passivity passivity;
+  MovingFrameSettings moving_frame;
   WrenchFilterSettings wrench_filter;
   SafetyLimits safety;
   Program program;

@@ -29,8 +29,9 @@ class JointMomentum {
   /// Nothing is known of the past; joints at q.
   void reset(const JointVector& q) noexcept;
   /// A tick; its sample `since` [s] after the one before (0: there is no new one), taken with the
-  /// platform turned by R_IP. What `known` newly knows counts as carried before.
-  void update(const KnownPayload& known, const Sample& sample, const Mat3& R_IP,
+  /// platform turned by R_IP, and as emulated by R_EP. What `known` newly knows counts as carried
+  /// before.
+  void update(const KnownPayload& known, const Sample& sample, const Mat3& R_IP, const Mat3& R_EP,
               double since) noexcept;
 
   /// [rad | m] Where the joints were at the time of the sample's wrench, by the parabola of the
@@ -41,7 +42,8 @@ class JointMomentum {
   const JointVector& q_dot() const noexcept { return shown_q_dot_; }  // [rad/s | m/s] the same
   /// F_Po_I of the joints on a base at rest: what the momentum has lost since the sample before,
   /// per second. Its sum over time loses nothing. Zero where only inertia is compensated.
-  const Wrench& force() const noexcept { return force_; }
+  const Wrench& force() const noexcept { return I_.force; }
+  const Wrench& emulatedForce() const noexcept { return E_.force; }  // the same about Po in E
   /// F_Po_I that a platform turning at w_IP_I shows of it in the sensor's mean, beyond what
   /// RobotInertia counts.
   Wrench shown(const Vec3& w_IP_I) const noexcept;
@@ -58,7 +60,7 @@ class JointMomentum {
   void relearn(const KnownPayload& known) noexcept;
   void addMiddle(const KnownPayload& known, bool first) noexcept;
   Filter filtered(std::int64_t time) const noexcept;
-  Vec6 momentum(const Channels& filtered) const noexcept;
+  Vec6 momentum(const Mat3& R, const Channels& filtered) const noexcept;
 
   bool compensated_, aided_;
   std::int64_t delay_;            // [ns] of the sensor, ServoModel
@@ -77,12 +79,15 @@ class JointMomentum {
   double chord_time_ = 0.0;            // [s] which took so long
   JointVector q_ = JointVector::Zero(), shown_q_dot_ = JointVector::Zero();
   Transform X_PL0_;
-  Mat3 R_IP_ = Mat3::Identity();
-  bool begun_ = false;            // there is a sample before
-  Vec6 shown_ = Vec6::Zero();     // [N, N m] in I, R_IP held
-  Vec6 mean_ = Vec6::Zero();      // [N s, N m s] about Po in I, in the sensor's mean
-  Vec6 momentum_ = Vec6::Zero();  // at the newest wrench
-  Wrench force_;
+  struct Seen {                    // about Po, in I or in E
+    Mat3 R = Mat3::Identity();     // of P in it
+    Vec6 momentum = Vec6::Zero();  // at the newest wrench
+    Wrench force;
+  };
+  Seen I_, E_;
+  bool begun_ = false;         // there is a sample before
+  Vec6 shown_ = Vec6::Zero();  // [N, N m] in I, R_IP held
+  Vec6 mean_ = Vec6::Zero();   // [N s, N m s] about Po in I, in the sensor's mean
 };
 
 }  // namespace ves

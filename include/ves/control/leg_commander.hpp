@@ -52,6 +52,8 @@ class LegCommander {
   void release(const LegMotion& legs) noexcept;
   /// Whether the legs may go home should no further command come.
   void allowPark(bool park) noexcept { command_.park = park; }
+  /// How the laboratory flies.
+  void fly(const Laboratory& laboratory) noexcept { command_.laboratory = laboratory; }
 
   /// [m] where the legs should be in this tick: the last command's lengths or, with the servos' lag
   /// taken out, those brought to now.

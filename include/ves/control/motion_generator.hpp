@@ -50,6 +50,10 @@ class MotionGenerator {
   const Waypoint<6>& motion() const noexcept { return motion_; }  // last commanded
   const Vec6& desired() const noexcept { return desired_; }       // at this very tick
   const AdmittanceControl& admittance() const noexcept { return admittance_; }
+  /// How a platform turned by R_IP is emulated; `since` [s]: of a wrench after the last step's.
+  Emulated emulated(const Mat3& R_IP, double since) const noexcept {
+    return emulates_ ? admittance_.emulated(R_IP, since) : admittance_.frame().emulated(R_IP);
+  }
   MotionPlan planned(const Segment& segment) const noexcept {
     return MotionPlan::of(settings_, segment, motion_);
   }
@@ -57,11 +61,13 @@ class MotionGenerator {
 
  private:
   void follow(const MotionPlan& plan) noexcept;
+  void endEmulation() noexcept;
 
   PlanSettings settings_;
   RecordedPath path_;
   AdmittanceControl admittance_;
   Segment segment_;
+  bool emulates_ = false;  // the admittance model runs
   MotionPlan plan_;
   double ahead_ = 0.0;           // [s] of the plan's points
   std::int64_t n_ = 0;           // [-] periods of the plan so far

@@ -87,18 +87,21 @@ class RobotInertia {
 
   /// F_Po_I that it takes to move the composite body, and to turn it while the joints change it;
   /// zero when that is not compensated, or before the legs are `engaged`. `count` [-] of the tick;
-  /// joints at q as the wrench shows them, `since` [s] after the time before; `legs` with the
-  /// accelerations that the wrench shows; `share` [-] of the compensation that is in.
+  /// joints at q as the wrench shows them, `since` [s] after the time before; the platform is
+  /// emulated turned by R_EP; `legs` with the accelerations that the wrench shows; `share` [-] of
+  /// the compensation that is in.
   Wrench update(const KnownPayload& known, std::int64_t count, const JointVector& q, double since,
-                const Transform& X_IP, const LegMotion& legs, bool engaged, double share) noexcept;
+                const Transform& X_IP, const Mat3& R_EP, const LegMotion& legs, bool engaged,
+                double share) noexcept;
 
   /// Of the composite body about Po in I, times the share. [kg, kg m, kg m^2]
   const Mat6& M_1() const noexcept { return M_1_; }
-  /// The same and before the newest sample, the share as now, with the attitudes they were seen at.
+  /// The same in E and before the newest sample, the share as now, with the attitudes they were
+  /// seen at.
   CarriedBody carried() const noexcept {
-    CarriedBody out(before_, M_1_);
-    out.R_IP_before = R_IP_before_;
-    out.R_IP = R_IP_;
+    CarriedBody out(share_ * E_before_.whole, share_ * E_.whole);
+    out.R_IP_before = E_before_.R;
+    out.R_IP = E_.R;
     return out;
   }
   /// Of the platform in I, when the newest sample was taken, its accelerations as the wrench shows
@@ -113,11 +116,14 @@ class RobotInertia {
   RigidBody composite_P_;
   JointVector composite_q_ = JointVector::Zero();  // [rad | m] that it was found at
   bool known_ = false;                             // composite_P_, since the legs were engaged
-  Mat6 whole_ = Mat6::Zero();                      // M_1 of all of it
-  Mat6 whole_before_ = Mat6::Zero();
-  Mat3 R_IP_ = Mat3::Identity(), R_IP_before_ = Mat3::Identity();  // where they were so
-  double since_ = 0.0;                                             // [s] between the two
-  Mat6 M_1_ = Mat6::Zero(), before_ = Mat6::Zero();
+  struct Seen {                                    // in I or E
+    Mat6 whole = Mat6::Zero();                     // M_1 of all of it
+    Mat3 R = Mat3::Identity();                     // of P, where it was so
+  };
+  Seen I_, I_before_, E_, E_before_;
+  double since_ = 0.0;  // [s] between the two
+  double share_ = 0.0;  // [-]
+  Mat6 M_1_ = Mat6::Zero();
   BodyMotion platform_;
 };
 

@@ -41,9 +41,12 @@ class TestPlatform {
     Wrench total;          // measured
     Wrench static_wrench;  // of gravity
     Wrench inertial;       // of the robot's composite body, when that is compensated
-    Wrench felt;           // total - static_wrench + inertial, less what is withheld as noise
+    Emulated emulated;     // how the platform is, as they show it
+    Wrench felt;           // total - static_wrench + inertial, less what is withheld as noise; as
+                           // emulated: F_Po_E
     Wrench dynamic;        // that, behind dead band and low-pass
   };
+  Wrench inE(const Emulated& emulated, const Wrench& F_Po_I) const noexcept;
   Waypoint<6> nextMotion(const Wrenches& W) noexcept;
   Checked safetyChecks(const Proposal& next, const Wrench& dynamic, bool conflict) const noexcept;
   void legCommunication(const Checked& next) noexcept;

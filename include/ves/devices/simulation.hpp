@@ -22,6 +22,11 @@ class Simulation {
     sample_ = plant_.sample();
     shift_ = now - plant_.time();
   }
+  /// To the plant, which has a clock of its own.
+  void command(LegCommand command) noexcept {
+    if (command.laboratory.flies()) command.laboratory.time -= shift_;
+    plant_.command(command);
+  }
   plant::Plant& plant() noexcept { return plant_; }
   /// Of the last advance(), by the plant's clock.
   const Sample& sample() const noexcept { return sample_; }
@@ -34,7 +39,7 @@ class Simulation {
  private:
   struct SimulatedLegs : Legs {
     explicit SimulatedLegs(Simulation& s) : all(s) {}
-    void command(const LegCommand& c) noexcept override { all.plant_.command(c); }
+    void command(const LegCommand& c) noexcept override { all.command(c); }
     bool read(LegReading& out) noexcept override {
       out = {all.sample_.legs, all.sample_.adc[kWrenchChannels], all.sample_.legs_time + all.shift_,
              (all.sample_.faults & kLegsPiece) != 0};

@@ -60,6 +60,10 @@ struct Emulation {
   Motion platform;  // in the first admittance segment
 };
 
+/// Where a platform that is emulated to be at x in E at the state's tick is shown; without a
+/// laboratory that flies at x.
+Vec6 shownAt(const state_t& state, const Vec6& x) noexcept;
+
 /// The base's motions that were needed last, for several threads. Runs that differ in noise, gains
 /// or filters share one: it depends on nothing but what is compared here.
 class ReferenceMotions {

@@ -8,6 +8,7 @@
 #include <array>
 
 #include "ves/math/frames.hpp"
+#include "ves/math/quintic.hpp"
 
 namespace ves {
 
@@ -51,6 +52,8 @@ LegMotion legMotion(const Geometry& geometry, const BodyMotion& P) noexcept;
 /// (2.33) in inertial axes.
 BodyMotion bodyMotion(const Vec3& p_IH, const Pose& x, const Vec6& x_dot,
                       const Vec6& x_ddot) noexcept;
+/// The coordinates of a motion of P about home, |beta| < 90 degrees.
+PathPoint<6> coordinates(const BodyMotion& P) noexcept;
 
 enum class SolveStatus {
   kConverged,

@@ -45,6 +45,8 @@ class Scene {
   void addMesh(const std::filesystem::path& file, const Visual& visual,
                nlohmann::ordered_json shape);
   void addArm();
+  void addEmulated();
+  Vec3 compass() const;
   void addWorld(const Environment& environment);
   /// A large platform's robot and sensor are no larger.
   double carriedSize() const { return std::min(size_, 1.0); }
@@ -60,6 +62,7 @@ class Scene {
   std::optional<Floating> target_;  // as it starts
   ArmShape arm_;                    // without points: none
   Eigen::MatrixXd Phi_;             // 6 x k, of the base's tip
+  bool flies_;                      // the laboratory does
   std::vector<std::string> frames_;
   std::vector<Scalar> scalars_;
   nlohmann::ordered_json description_;

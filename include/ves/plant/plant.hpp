@@ -86,7 +86,7 @@ struct Truth {
   JointState joints;
   Wrench contact_To_I;          // on the tool from what it touches, mean over the last step
   double clearance = HUGE_VAL;  // [m] of the tool from the nearest surface, least in it
-  Floating target;              // the body that floats
+  Floating target;              // the body that floats, in E
   ContactWatch contacts;
   std::optional<BegunPush> push;  // the last one
   int pushes = 0;                 // [-] so far
@@ -148,6 +148,7 @@ class Plant {
   void planRobotEvent() noexcept;
   void startRobotEvents() noexcept;
   Wrench sensorLoad() noexcept;
+  BodyMotion emulated() const noexcept;
   FrameMotion toolMotion() const noexcept;
   bool push(const Push& push) noexcept;
   Wrench pushed(std::int64_t from) const noexcept;
@@ -165,6 +166,7 @@ class Plant {
   std::optional<HydraulicPlatform> hydraulic_;  // or the platform on those that feel it
   Vec6 magnets_;                                // [m] of their transducers
   LegWatchdog watchdog_;
+  Laboratory laboratory_;  // the world is in E
   ForceTorqueSensor sensor_;
   Butterworth2<kLegs> filter_position_;
   Butterworth3<kLegs> filter_velocity_, filter_acceleration_;

@@ -101,6 +101,8 @@ RigidBody rotated(const Mat3& R_AB, const RigidBody& body_B) noexcept;
 
 /// [F; N] = spatialMass * [a; alpha] of Bo, for a body that does not turn yet.
 Mat6 spatialMass(const RigidBody& body) noexcept;
+/// Of the same body, with its basis turned.
+Mat6 rotated(const Mat3& R_AB, const Mat6& M_B) noexcept;
 
 /// Of every link that moves, in L0. Entries from RobotModel::size on are not set.
 class LinkPoses {

@@ -27,7 +27,8 @@ struct VehicleModel {
 /// Its modes about home: what can be said of it before it moves far.
 ModalModel linearised(const VehicleModel& model);
 
-/// It steps.
+/// Any of them, in its inertial frame I; where the laboratory moves, that is E (control/
+/// moving_frame.hpp).
 class AdmittanceModel {
   using Kinds = std::variant<ModalVehicle, FreeBody>;
 
@@ -118,8 +119,20 @@ class AdmittanceModel {
   }
 
   /// (C.7): position, velocity, acceleration at the last step's end, or ahead of it.
-  const PathPoint<6>& motion() const noexcept {
-    return each([](const auto& v) -> const PathPoint<6>& { return v.motion(); });
+  PathPoint<6> motion() const noexcept {
+    return each([](const auto& v) { return v.motion(); });
+  }
+  /// The same however far it has turned; and with the accelerations it would have if nothing acted
+  /// on it, its springs, dampers and thrusters included.
+  BodyMotion bodyMotion() const noexcept {
+    return each([](const auto& v) { return v.bodyMotion(); });
+  }
+  BodyMotion coasting() const noexcept {
+    return each([](const auto& v) { return v.coasting(); });
+  }
+  /// At the last step's end, not ahead of it, without accelerations.
+  BodyMotion atWrench() const noexcept {
+    return each([](const auto& v) { return v.atWrench(); });
   }
 
   /// Motions beside this one, small: their coordinates, and the vehicle where it is with the body

@@ -10,6 +10,7 @@
 // where the angular momentum stays the same to rounding while nothing acts.
 #pragma once
 
+#include "ves/kinematics/stewart.hpp"
 #include "ves/robot/robot_model.hpp"
 #include "ves/vehicle/modal_vehicle.hpp"
 #include "ves/vehicle/propulsion.hpp"
@@ -74,7 +75,10 @@ class FreeBody {
   double damped() const noexcept { return -damping_.dot(way_); }
   double shaken() const noexcept { return pushed_.dot(way_); }  // by its thrusters
 
-  const PathPoint<6>& motion() const noexcept { return now_.motion; }
+  PathPoint<6> motion() const noexcept { return coordinates(now_.motion); }
+  const BodyMotion& bodyMotion() const noexcept { return now_.motion; }
+  BodyMotion coasting() const noexcept;
+  BodyMotion atWrench() const noexcept;
 
   /// Six coordinates of a motion beside this one, small, in I: without stiffness or damping, the
   /// vehicle's mass less 1 counted to the body on it.
@@ -89,7 +93,7 @@ class FreeBody {
  private:
   struct State {
     RigidState rigid;
-    PathPoint<6> motion;
+    BodyMotion motion;
     double time = 0.0;  // [s] since it was let go
     Pulses pulses;
   };
@@ -102,6 +106,7 @@ class FreeBody {
   double period_;  // [s]
   VehicleFactors factors_;
   double dt_ = 0.0;  // [s] of the last step
+  Mat6 whole_P_;     // with the robot, about Po in P
   State now_, before_;
   Vec6 way_ = Vec6::Zero();       // [m, rad] of the last step, in I
   Vec6 pushed_ = Vec6::Zero();    // [N, N m] by thrusters in it, in I

@@ -215,6 +215,9 @@ class ModalVehicle {
 
   /// (C.7): position, velocity, acceleration at the last step's end, or ahead of it.
   const PathPoint<6>& motion() const noexcept { return now_.motion; }
+  BodyMotion bodyMotion() const noexcept;
+  BodyMotion coasting() const noexcept;
+  BodyMotion atWrench() const noexcept;
 
   const ModalDynamics& dynamics() const noexcept { return dynamics_; }
   /// Where it is, with the body M_1 on it, for motions beside this one.
