@@ -28,12 +28,12 @@ AdmittanceControl::AdmittanceControl(const ControllerConfig& config)
 
 void AdmittanceControl::begin(const Vec6& x, const Mat6& M_1, double age, double share) noexcept {
   change_.finish(model_);
-  const double ahead = inertia_ ? age + share * wrench_delay_ : 0.0;
+  ahead_ = inertia_ ? age + share * wrench_delay_ : 0.0;
   if (frame_.enabled()) {
-    model_.reset(frame_.emulated(x), rotated(frame_.laboratory().X.R, M_1), ahead);
+    model_.reset(frame_.emulated(x), rotated(frame_.laboratory().X.R, M_1), ahead_);
     frame_.begin(model_.bodyMotion());
   } else {
-    model_.reset(x, M_1, ahead);
+    model_.reset(x, M_1, ahead_);
   }
   begins_ = true;
   shaken_ = 0.0;
@@ -58,13 +58,15 @@ const PathPoint<6>& AdmittanceControl::step(const AdmittanceInput& in, const Pat
     if (begins_ && aided_) hindsight_.reset(model_, in.lesson);
     begins_ = false;
     change_.advance(model_);
-    if (frame_.enabled()) {
+    const double ahead = inertia_ ? in.wrench.age + in.share * wrench_delay_ : 0.0;
+    if (frame_.enabled()) {  // as far as what is shown goes, late as a tick may be
       const bool steady = frame_.steadyInContact() && in.touches;
-      frame_.step(last, model_.coasting(), steady ? 0.0 : in.share);
+      frame_.step(last, model_.coasting(), steady ? 0.0 : in.share, since + ahead - ahead_);
     }
+    ahead_ = ahead;
     const double damping = energy_.damping() + change_.damping();
     if (inertia_)
-      model_.step(in.F_Po_E, in.body, since, in.wrench.age + in.share * wrench_delay_, damping);
+      model_.step(in.F_Po_E, in.body, since, ahead, damping);
     else
       model_.step(in.F_Po_E, damping);
     if (aided_) {

@@ -21,7 +21,6 @@ Vec3 following(double k, const Vec3& x, const Vec3& x_dot, double most) noexcept
 
 MovingFrame::MovingFrame(const ControllerConfig& config)
     : settings_(config.moving_frame),
-      period_(config.periodSeconds()),
       home_(std::sqrt(settings_.acceleration / (settings_.share * config.safety.translation))),
       upright_(
           std::sqrt(settings_.angular_acceleration / (settings_.share * config.safety.rotation))) {}
@@ -32,7 +31,8 @@ void MovingFrame::begin(const BodyMotion& E_P) noexcept {
   E_H_.v = E_P.v - E_P.w.cross(p);
 }
 
-void MovingFrame::step(const PathPoint<6>& shown, const BodyMotion& E_P, double share) noexcept {
+void MovingFrame::step(const PathPoint<6>& shown, const BodyMotion& E_P, double share,
+                       double dt) noexcept {
   BodyMotion P = motionOf(shown);
   P.a = -share * following(home_, P.X.p, P.v, settings_.acceleration);
   P.alpha =
@@ -41,7 +41,7 @@ void MovingFrame::step(const PathPoint<6>& shown, const BodyMotion& E_P, double 
   const BodyMotion moves = composed(E_H_, P);
   E_H_.alpha += E_P.alpha - moves.alpha;
   E_H_.a += E_P.a - composed(E_H_, P).a;
-  E_H_ = later(E_H_, period_);
+  E_H_ = later(E_H_, dt);
 }
 
 void MovingFrame::yield(const BodyMotion& E_P, const PathPoint<6>& shown) noexcept {

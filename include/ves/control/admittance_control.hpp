@@ -78,6 +78,7 @@ class AdmittanceControl {
   Hindsight hindsight_;
   bool inertia_, aided_;  // compensated, what the model feels
   double wrench_delay_;   // [s]
+  double ahead_ = 0.0;    // [s] of the last wrench, that is shown
   bool begins_ = true;    // the first step: what was before it does not count
   Oscillation oscillation_;
   double shaken_ = 0.0;  // [J] by the ground so far

@@ -40,8 +40,8 @@ class MovingFrame {
 
   /// Begins to fly along with a vehicle that moves so: it rests in the laboratory.
   void begin(const BodyMotion& E_P) noexcept;
-  /// A period on. P was shown at `shown`, and coasts as E_P; `share` [-] of the following is done.
-  void step(const PathPoint<6>& shown, const BodyMotion& E_P, double share) noexcept;
+  /// dt [s] on. P was shown at `shown`, and coasts as E_P; `share` [-] of the following is done.
+  void step(const PathPoint<6>& shown, const BodyMotion& E_P, double share, double dt) noexcept;
   /// Where the platform shows a P that moves so.
   PathPoint<6> shown(const BodyMotion& E_P) const noexcept {
     return coordinates(relative(E_H_, E_P));
@@ -64,7 +64,6 @@ class MovingFrame {
 
  private:
   MovingFrameSettings settings_;
-  double period_;          // [s]
   double home_, upright_;  // [1/s] k of position and attitude
   BodyMotion E_H_;
 };
