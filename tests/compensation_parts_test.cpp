@@ -619,8 +619,7 @@ TEST(PortWork, IsThatOfTheForceBeforeTheSensorsFilter) {
           for (std::size_t i = end - kSteps; i < end; ++i) sum += shown[i];
           Wrench F;
           F.f.z() = mean ? sum / kSteps : shown[end - 1];
-          const PortWork::Work work =
-              port.take(F, (k + 1) * kTick, 0.0, X_IP, servo, MovingFrame(config));
+          const PortWork::Work work = port.take(F, (k + 1) * kTick, X_IP, servo);
           newest += work.newest;
           settled += work.settled;
           const double length = servo.length()(0);
@@ -675,10 +674,9 @@ TEST(PortWork, IsExactForPolynomialsOfTime) {
       Wrench reading;
       reading.f.z() = S(seconds(middles[i]));
       const std::int64_t read = middles[i] + window / 2;
-      work = port.take(reading, read, 0.0, X_IP, servo, MovingFrame(config));
+      work = port.take(reading, read, X_IP, servo);
       EXPECT_EQ(work.newest == 0.0, i < 2);
-      const PortWork::Work again =
-          port.take(reading, read, 0.0, X_IP, servo, MovingFrame(config));  // it is not new
+      const PortWork::Work again = port.take(reading, read, X_IP, servo);  // it is not new
       EXPECT_EQ(again.newest, 0.0);
       EXPECT_EQ(again.settled, 0.0);
     }
@@ -694,7 +692,7 @@ TEST(PortWork, IsExactForPolynomialsOfTime) {
     // After a gap the readings before it say nothing.
     const std::int64_t later = middles[3] + 40'000'000;
     servo.advance(later);
-    work = port.take({}, later, 0.0, g.fromHome({}), servo, MovingFrame(config));
+    work = port.take({}, later, g.fromHome({}), servo);
     EXPECT_EQ(work.newest, 0.0);
     EXPECT_EQ(work.settled, 0.0);
   }

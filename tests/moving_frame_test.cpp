@@ -170,6 +170,26 @@ TEST(Flight, ThreeTurnsAndAMileAreShownInAHandsBreadth) {
   }
 }
 
+TEST(Flight, TheEnergyThatIsPutInIsThatOfTheVehiclesWay) {
+  // The same motion at 0 and at 50 m/s: forces do other work, and what the emulation adds to it is
+  // the same.
+  const auto putIn = [](const char* name, const char* velocity) {
+    const RecordedRun run = recordLockstep(
+        test::experiment(name, {"controller.moving_frame.enabled=true", "sensor.noise=false",
+                                std::string("base.free.velocity_m_per_s=") + velocity}));
+    std::vector<double> out;
+    for (const Row& row : run.series.rows)
+      if (inAdmittance(row.state)) out.push_back(row.state.energy_put_in);
+    return out;
+  };
+  const std::vector<double> slow = putIn("satellite_puma", "[0, 0, 0]"),
+                            fast = putIn("satellite_puma", "[50, 0, 0]");
+  ASSERT_EQ(slow.size(), fast.size());
+  for (std::size_t k = 0; k < slow.size(); k += 10) EXPECT_NEAR(slow[k], fast[k], 1e-3) << k;
+  for (const double tumbling : putIn("satellite_tumbling", "[50, 0, 0]"))
+    EXPECT_LT(std::abs(tumbling), 2e-3);
+}
+
 TEST(Flight, EmulatesWhatALaboratoryThatRestsDoes) {
   // Small enough for both; with thrusters and an attitude hold, and another period.
   for (const auto& [name, set] : std::vector<std::pair<std::string, std::vector<std::string>>>{
@@ -260,10 +280,12 @@ TEST(Flight, TheLaboratoryRestsWhereNothingIsEmulated) {
   ASSERT_TRUE(run.result.good());
   const state_t* before = nullptr;
   bool flown = false;
+  double shown = 0.0;  // [m] without a robot that moves
   for (const Row& row : run.series.rows) {
     const state_t& s = row.state;
     if (inAdmittance(s)) {
       flown = true;
+      shown = std::max(shown, Vec6::Map(s.x).head<3>().norm());
       EXPECT_GT(Vec3::Map(s.laboratory_w).norm(), 0.3);
     } else {
       EXPECT_EQ(Vec3::Map(s.laboratory_v).norm() + Vec3::Map(s.laboratory_w).norm(), 0.0);
@@ -274,6 +296,7 @@ TEST(Flight, TheLaboratoryRestsWhereNothingIsEmulated) {
     before = &s;
   }
   EXPECT_TRUE(flown);
+  EXPECT_LT(shown, 5e-4);
   EXPECT_GT(Vec3::Map(before->laboratory_p).norm(), 5.0);  // it is not taken back
 }
 

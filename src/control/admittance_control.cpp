@@ -61,6 +61,7 @@ const PathPoint<6>& AdmittanceControl::step(const AdmittanceInput& in, const Pat
     const double ahead = inertia_ ? in.wrench.age + in.share * wrench_delay_ : 0.0;
     if (frame_.enabled()) {  // as far as what is shown goes, late as a tick may be
       const bool steady = frame_.steadyInContact() && in.touches;
+      model_.countFrom(frame_.along(model_.atWrench().X.p, ahead_));
       frame_.step(last, model_.coasting(), steady ? 0.0 : in.share, since + ahead - ahead_);
     }
     ahead_ = ahead;
@@ -81,7 +82,7 @@ const PathPoint<6>& AdmittanceControl::step(const AdmittanceInput& in, const Pat
     change_.pay(for_change);
     energy_.take({model_.taken(in.F_Po_E), model_.takenOfNoise(in.noise), model_.dissipated(),
                   model_.damped() - for_change, model_.kineticEnergy()},
-                 port_.take(in.at_port, in.wrench.time, in.wrench.age, in.X_IP, in.servo, frame_));
+                 port_.take(in.at_port, in.wrench.time, in.X_IP, in.servo));
     const SafetyLimits& limits = checks.limits();
     const bool held = scale_ < 1.0 && model_.kineticEnergy() > limits.growth_floor;
     shaken_ += model_.shaken();

@@ -78,19 +78,9 @@ Vec6 MovingFrame::emulated(const Vec6& x) const noexcept {
   return (Vec6() << X_EP.p, fixedAngles(X_EP.R)).finished();
 }
 
-Motions MovingFrame::emulated(const Motions& moments, const Vec3& p_HP, double time,
-                              double ago) const noexcept {
+Vec6 MovingFrame::along(const Vec3& p_EP, double ago) const noexcept {
   const BodyMotion H = later(E_H_, -ago);
-  const Vec3 v = H.v + H.w.cross(H.X.R * p_HP);
-  Motions out;
-  double power = 1.0;
-  for (Eigen::Index n = 0; n < out.cols(); ++n) {
-    power *= time;
-    const double held = power / static_cast<double>(n + 1);  // int t^n dt
-    out.col(n) << held * v + H.X.R * moments.col(n).head<3>(),
-        held * H.w + H.X.R * moments.col(n).tail<3>();
-  }
-  return out;
+  return (Vec6() << H.v + H.w.cross(p_EP - H.X.p), H.w).finished();
 }
 
 }  // namespace ves

@@ -6,8 +6,7 @@
 
 namespace ves {
 
-PortWork::PortWork(const ControllerConfig& config) noexcept
-    : geometry_(config.geometry), period_(config.periodSeconds()) {
+PortWork::PortWork(const ControllerConfig& config) noexcept : geometry_(config.geometry) {
   constexpr std::int64_t kMostPeriods = 3;  // [-] the servo model remembers no more
   const ServoModel& servo = config.servo;
   const double w = servo.sensor_cutoff, window = servo.sensor_window;
@@ -17,24 +16,19 @@ PortWork::PortWork(const ControllerConfig& config) noexcept
   curvature_ = 1.0 / (w * w) - window * window / 24.0;
 }
 
-PortWork::Work PortWork::take(const Wrench& F, std::int64_t time, double age, const Transform& X_IP,
-                              const ServoObserver& servo, const MovingFrame& frame) noexcept {
+PortWork::Work PortWork::take(const Wrench& F_Po_I, std::int64_t time, const Transform& X_IP,
+                              const ServoObserver& servo) noexcept {
   const std::int64_t middle = time - late_, since = middle - last_[3].time;
   if (known_ > 0 && since <= 0) return {};
   if (since > longest_) known_ = 0;
   std::rotate(last_.begin(), last_.begin() + 1, last_.end());
-  last_[3] = {middle, F.stacked()};
+  last_[3] = {middle, F_Po_I.stacked()};
   known_ = std::min(known_ + 1, kReadings);
   const Motions before = moments_;
   moments_ = servo.moments(last_[2].time, last_[3].time);
   if (known_ < 3 || !platformMotions(geometry_, X_IP, moments_)) {
     moments_.setZero();
     return {};
-  }
-  if (frame.enabled()) {
-    const double late = static_cast<double>(late_) * kSecondPerNanosecond;
-    moments_ = frame.emulated(moments_, X_IP.p - geometry_.home(), seconds(2, 3),
-                              period_ + age + late + 0.5 * seconds(2, 3));
   }
 
   Work out;

@@ -104,8 +104,9 @@ Waypoint<6> TestPlatform::nextMotion(const Wrenches& W) noexcept {
         aided_.withholds()
             ? Mat6(Mat6::Zero())
             : filter_.noise(wrenchNoise(config_.sensor, bias_.noise(), W.emulated.R_EP));
+    const Wrench at_port = W.emulated.flies ? rotate(W.emulated.R_EI.transpose(), W.felt) : W.felt;
     return motion_.admittanceModel(
-        {W.dynamic, W.felt, noise, robot_.carried(), share_.value(), samples_.wrench(),
+        {W.dynamic, at_port, noise, robot_.carried(), share_.value(), samples_.wrench(),
          !aided_.withholds(), aided_.lesson(), sample.q, commander_.legs().L, X_IP, legs_.servo()},
         safety_.path());
   }

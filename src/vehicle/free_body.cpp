@@ -119,6 +119,7 @@ void FreeBody::reset(const Vec6& x, const Mat6& M_1, double ahead) noexcept {
   whole_P_ = M_P;
   now_.motion = motionOf(M_P, s, {});
   now_.time = ahead > 0.0 ? -ahead : 0.0;
+  along_.setZero();
   now_.pulses = {};
   if (ahead > 0.0 && !velocity(s).isZero(0.0)) s = advanced(M_P, M_P, s, {}, -ahead);
 }
@@ -137,7 +138,7 @@ void FreeBody::step(const Wrench& F_Po_I, const CarriedBody& carried, double dt,
              after = own + rotated(carried.R_IP.transpose(), carried.M_1),
              middle = rotated(from.R_IP, 0.5 * (before + after));
   mobility_ = middle.inverse();
-  damping_ = -damping * (middle * velocity(from));
+  damping_ = -damping * (middle * (velocity(from) - along_));
   Wrench F = Wrench::from(F_Po_I.stacked() + damping_), F_ahead = F;
   const Propulsion& jets = model_.propulsion;
   if (jets.any()) {
@@ -179,8 +180,9 @@ BodyMotion FreeBody::atWrench() const noexcept {
 
 double FreeBody::kineticEnergy() const noexcept {
   const RigidState& s = now_.rigid;
+  const Mat3 R_PI = s.R_IP.transpose();
   Vec6 V_P;
-  V_P << s.R_IP.transpose() * s.v, s.R_IP.transpose() * s.w;
+  V_P << R_PI * (s.v - along_.head<3>()), R_PI * (s.w - along_.tail<3>());
   return 0.5 * factors_.mass * V_P.dot(M_P_ * V_P);
 }
 

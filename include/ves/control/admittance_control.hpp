@@ -17,7 +17,7 @@ namespace ves {
 /// What a step of admittance control is made of.
 struct AdmittanceInput {
   const Wrench& F_Po_E;        // E is I where the laboratory rests
-  const Wrench& at_port;       // F_Po_E before dead band and low-pass
+  const Wrench& at_port;       // F_Po_I, the same before dead band and low-pass
   const Mat6& noise;           // covariance of F_Po_E's noise (wrenchNoise)
   const CarriedBody& body;     // the composite body that is compensated
   double share;                // [-] of the compensation

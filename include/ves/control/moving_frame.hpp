@@ -57,10 +57,8 @@ class MovingFrame {
   Emulated emulated(const Mat3& R_IP, const BodyMotion& E_P, double since) const noexcept;
   /// Position and fixed angles in E of a platform shown at x.
   Vec6 emulated(const Vec6& x) const noexcept;
-  /// The moments (ServoObserver) of P's motion in E, of those in the laboratory at p_HP over `time`
-  /// [s], which ended `ago` [s] before laboratory().
-  Motions emulated(const Motions& moments, const Vec3& p_HP, double time,
-                   double ago) const noexcept;
+  /// [m/s, rad/s] Of a P at p_EP that goes along, `ago` [s] before laboratory().
+  Vec6 along(const Vec3& p_EP, double ago) const noexcept;
 
  private:
   MovingFrameSettings settings_;

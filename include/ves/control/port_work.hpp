@@ -3,7 +3,7 @@
 // The work that the wrench at the port does on the platform, from one reading to the next.
 #pragma once
 
-#include "ves/control/moving_frame.hpp"
+#include "ves/control/controller_config.hpp"
 #include "ves/control/servo_observer.hpp"
 
 namespace ves {
@@ -29,11 +29,10 @@ class PortWork {
     double settled = 0.0;
   };
 
-  /// On the platform, now at X_IP; nothing without enough readings, or when F is not new. It was
-  /// read at `time` [ns] of the servo model's clock, `age` [s] before the tick. F_Po_I, or F_Po_E
-  /// and its work in E where the laboratory flies.
-  Work take(const Wrench& F, std::int64_t time, double age, const Transform& X_IP,
-            const ServoObserver& servo, const MovingFrame& frame) noexcept;
+  /// On the platform, now at X_IP; nothing without enough readings, or when F_Po_I is not new. It
+  /// was read at `time` [ns] of the servo model's clock.
+  Work take(const Wrench& F_Po_I, std::int64_t time, const Transform& X_IP,
+            const ServoObserver& servo) noexcept;
 
  private:
   using Polynomial = Motions;  // [N | N m] coefficients of 1, t, t^2, t^3
@@ -48,7 +47,6 @@ class PortWork {
   double work(const Polynomial& S, const Motions& moments) const noexcept;
 
   Geometry geometry_;
-  double period_;         // [s]
   std::int64_t late_;     // [ns] a reading's end after its middle
   std::int64_t longest_;  // [ns] between two readings that belong together
   double slope_;          // [s] sqrt(2)/w

@@ -90,6 +90,11 @@ class AdmittanceModel {
     return each([&](const auto& v) { return v.affords(factors); });
   }
 
+  /// Energies, work and damping are of its motion beside this [m/s, rad/s] of Po in I, in which a
+  /// laboratory flies along with what floats.
+  void countFrom(const Vec6& rate) noexcept {
+    return each([&](auto& v) { v.countFrom(rate); });
+  }
   /// [J] of the vehicle alone.
   double kineticEnergy() const noexcept {
     return each([](const auto& v) { return v.kineticEnergy(); });

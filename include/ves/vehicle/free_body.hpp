@@ -65,15 +65,16 @@ class FreeBody {
   }
   bool affords(const VehicleFactors&) const noexcept { return true; }
 
+  void countFrom(const Vec6& rate) noexcept { along_ = rate; }
   double kineticEnergy() const noexcept;
   double energy() const noexcept { return kineticEnergy(); }
-  double taken(const Wrench& F_Po_I) const noexcept { return F_Po_I.stacked().dot(way_); }
+  double taken(const Wrench& F_Po_I) const noexcept { return F_Po_I.stacked().dot(way()); }
   double dissipated() const noexcept { return 0.0; }
   double takenOfNoise(const Mat6& covariance) const noexcept {
     return 0.5 * dt_ * dt_ * covariance.cwiseProduct(mobility_).sum();
   }
-  double damped() const noexcept { return -damping_.dot(way_); }
-  double shaken() const noexcept { return pushed_.dot(way_); }  // by its thrusters
+  double damped() const noexcept { return -damping_.dot(way()); }
+  double shaken() const noexcept { return pushed_.dot(way()); }  // by its thrusters
 
   PathPoint<6> motion() const noexcept { return coordinates(now_.motion); }
   const BodyMotion& bodyMotion() const noexcept { return now_.motion; }
@@ -98,6 +99,7 @@ class FreeBody {
     Pulses pulses;
   };
 
+  Vec6 way() const noexcept { return way_ - dt_ * along_; }
   Mat6 massInP() const noexcept { return factors_.mass * M_P_; }
 
   FreeBodyModel model_;
@@ -109,6 +111,7 @@ class FreeBody {
   Mat6 whole_P_;     // with the robot, about Po in P
   State now_, before_;
   Vec6 way_ = Vec6::Zero();       // [m, rad] of the last step, in I
+  Vec6 along_ = Vec6::Zero();     // [m/s, rad/s] that energies and damping count from
   Vec6 pushed_ = Vec6::Zero();    // [N, N m] by thrusters in it, in I
   Vec6 damping_ = Vec6::Zero();   // [N, N m] in it
   Mat6 mobility_ = Mat6::Zero();  // [1/kg] in it: acceleration per wrench

@@ -179,6 +179,7 @@ class ModalVehicle {
     return nominal_.scaled(factors).angle(period_) <= kMostModalAngle;
   }
 
+  void countFrom(const Vec6&) noexcept {}  // nobody flies along with what stands
   /// [J]
   double kineticEnergy() const noexcept {
     return factors_.mass * 0.5 * now_.modes.eta_dot.squaredNorm();
