@@ -40,7 +40,9 @@ int sweepCommand(int argc, char** argv) {
       "command again goes on where it ended. Under mpirun every process takes its share; they meet "
       "in one folder.",
       "ves sweep");
-  std::string scenario, out;
+  std::string scenario, out, figure;
+  double until = 0.0;
+  SweepDesign design = SweepDesign::kUniform;
   std::vector<std::string> sets, vary, draw;
   std::int64_t runs = 1;
   std::uint64_t seed = 1;
@@ -53,6 +55,16 @@ int sweepCommand(int argc, char** argv) {
   cli.add_option("--runs", runs, "of each combination, each with its own noise")
       ->check(CLI::Range(1, 100'000'000))
       ->capture_default_str();
+  cli.add_option("--design", design, "how draws lie: uniform, latin (hypercube) or sobol")
+      ->transform(CLI::CheckedTransformer(
+          std::map<std::string, SweepDesign>{{"uniform", SweepDesign::kUniform},
+                                             {"latin", SweepDesign::kLatin},
+                                             {"sobol", SweepDesign::kSobol}}));
+  cli.add_option("--figure", figure,
+                 "COLUMN, whose mean is told, or COLUMN>LIMIT: how often; with 95 % confidence");
+  cli.add_option("--until", until, "half of that interval, at which no more runs are needed")
+      ->check(CLI::PositiveNumber)
+      ->needs("--figure");
   cli.add_option("--seed", seed, "of draws and noise")
       ->check(CLI::Range(std::int64_t{0}, std::int64_t{UINT32_MAX}))
       ->capture_default_str();
@@ -65,6 +77,7 @@ int sweepCommand(int argc, char** argv) {
     for (const std::string& option : draw) plan.draw(option);
     plan.repeat(runs);
     plan.seed(seed);
+    plan.lay(design);
     if (plan.size() == 1) throw InputError("one run only: want --vary or --runs");
     SweepOptions options;
     options.scenario = findScenario(scenario, configFolder());
@@ -72,6 +85,12 @@ int sweepCommand(int argc, char** argv) {
     options.workers = workers;
     options.rank = rank;
     options.ranks = ranks;
+    if (!figure.empty()) options.figure = Figure(figure);
+    options.until = until;
+    if (until > 0.0 && ranks > 1)
+      throw InputError("--until: looks at rows one after the other, want one process");
+    if (until > 0.0 && design != SweepDesign::kUniform)
+      throw InputError("--until: fewer runs are no such design, want --design uniform");
     // What is wrong with the first and the last is told before hours have passed.
     for (const std::int64_t run : {std::int64_t{0}, plan.size() - 1}) {
       std::vector<std::string> all = sets;
@@ -102,6 +121,15 @@ int sweepCommand(int argc, char** argv) {
     fmt::print("{} runs{}\n{}\n", result.rows,
                result.not_good ? fmt::format(", {} of them not to their end", result.not_good) : "",
                options.file.string());
+    if (result.figure) {
+      const Figure::Estimate& f = *result.figure;
+      const char* none = design == SweepDesign::kUniform ? "" : ", or closer by its design";
+      fmt::print("{}: {:.4g}, {:.4g} to {:.4g} with 95 % confidence{}, of {} runs{}\n", figure,
+                 f.value, f.low, f.high, none, f.of,
+                 f.without ? fmt::format("; {} have none", f.without) : "");
+      if (until > 0.0 && !(f.half() <= until))
+        fmt::print("not within {:g}: want more --runs\n", until);
+    }
     return kDone;
   });
 }

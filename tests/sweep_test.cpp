@@ -94,6 +94,152 @@ TEST(SweepPlan, RefusesByName) {
   EXPECT_THROW(plan.size(), InputError);
 }
 
+/// [-] of each key's range, 0 to 1, of the runs of one combination after another.
+std::vector<std::vector<double>> shares(SweepDesign design, std::int64_t runs, std::uint64_t seed,
+                                        int keys = 2) {
+  SweepPlan plan;
+  plan.vary("c=1,2");
+  for (int i = 0; i < keys; ++i) plan.draw("k" + std::to_string(i) + "=0:1");
+  plan.repeat(runs);
+  plan.seed(seed);
+  plan.lay(design);
+  std::vector<std::vector<double>> out(static_cast<std::size_t>(keys));
+  for (std::int64_t run = 0; run < plan.size(); ++run) {
+    const std::vector<std::string> all = plan.overrides(run);
+    for (std::size_t i = 0; i < out.size(); ++i) out[i].push_back(std::stod(all[i + 1].substr(3)));
+  }
+  return out;
+}
+
+TEST(SweepDesign, ALatinHypercubeHasOneDrawInEachPartOfEveryKey) {
+  constexpr std::int64_t kRuns = 1000;
+  const auto a = shares(SweepDesign::kLatin, kRuns, 1), b = shares(SweepDesign::kLatin, kRuns, 2);
+  EXPECT_EQ(a, shares(SweepDesign::kLatin, kRuns, 1));
+  int same = 0, in_order = 0;
+  for (const auto& key : a)
+    for (std::int64_t first : {std::int64_t{0}, kRuns}) {  // of each combination
+      std::set<int> parts;
+      for (std::int64_t i = first; i < first + kRuns; ++i) {
+        const double x = key[static_cast<std::size_t>(i)];
+        ASSERT_TRUE(x >= 0.0 && x < 1.0);
+        parts.insert(static_cast<int>(kRuns * x));
+        in_order += static_cast<int>(kRuns * x) == i - first;
+      }
+      EXPECT_EQ(parts.size(), static_cast<std::size_t>(kRuns));
+    }
+  // Keys, combinations and seeds have orders of their own: about one in a thousand agrees.
+  double product = 0.0;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(kRuns); ++i) {
+    const auto part = [&](double x) { return static_cast<int>(kRuns * x); };
+    same += (part(a[0][i]) == part(a[1][i])) + (part(a[0][i]) == part(b[0][i])) +
+            (part(a[0][i]) == part(a[0][i + kRuns]));
+    product += (a[0][i] - 0.5) * (a[1][i] - 0.5) * 12.0 / kRuns;
+  }
+  EXPECT_LT(same, 20);
+  EXPECT_LT(in_order, 25);
+  EXPECT_LT(std::abs(product), 5.0 / std::sqrt(kRuns));  // uncorrelated
+}
+
+TEST(SweepDesign, SobolsPointsLeaveNoBoxOut) {
+  // Of 2^10 points the first two keys have one in each of 2^10 boxes, of whichever sides, and every
+  // key one in each part of its range.
+  constexpr std::int64_t kRuns = 1024;
+  for (std::uint64_t seed : {1u, 7u}) {
+    const auto x = shares(SweepDesign::kSobol, kRuns, seed, 5);
+    for (std::size_t first : {std::size_t{0}, static_cast<std::size_t>(kRuns)}) {
+      for (int k = 0; k <= 10; ++k) {
+        std::set<std::pair<int, int>> boxes;
+        for (std::size_t i = first; i < first + kRuns; ++i)
+          boxes.insert({static_cast<int>(std::ldexp(x[0][i], k)),
+                        static_cast<int>(std::ldexp(x[1][i], 10 - k))});
+        EXPECT_EQ(boxes.size(), static_cast<std::size_t>(kRuns)) << k;
+      }
+      for (const auto& key : x) {
+        std::set<int> parts;
+        for (std::size_t i = first; i < first + kRuns; ++i)
+          parts.insert(static_cast<int>(kRuns * key[i]));
+        EXPECT_EQ(parts.size(), static_cast<std::size_t>(kRuns));
+      }
+    }
+  }
+  EXPECT_NE(shares(SweepDesign::kSobol, 8, 1), shares(SweepDesign::kSobol, 8, 2));
+}
+
+TEST(SweepDesign, RefusesWhatItCannotLay) {
+  SweepPlan none;
+  none.repeat(8);
+  EXPECT_THROW(none.lay(SweepDesign::kLatin), InputError);
+  SweepPlan many;
+  for (int i = 0; i < 41; ++i) many.draw("k" + std::to_string(i) + "=0:1");
+  many.repeat(8);
+  EXPECT_THROW(many.lay(SweepDesign::kSobol), InputError);
+  SweepPlan long_one;
+  long_one.draw("k=0:1");
+  long_one.repeat(1'000'000'000);
+  EXPECT_THROW(long_one.lay(SweepDesign::kSobol), InputError);
+}
+
+Figure::Estimate estimate(const std::string& text, const std::vector<std::string>& column) {
+  Figure figure(text);
+  figure.find({"run", "a", "b"});
+  for (const std::string& one : column) figure.add({"0", "7", one});
+  return figure.estimate();
+}
+
+TEST(Figure, IsTheMeanWithItsInterval) {
+  std::vector<std::string> column;
+  for (int i = 1; i <= 100; ++i) column.push_back(std::to_string(i));
+  column.insert(column.end(), {"", "nan", "refused"});
+  const Figure::Estimate e = estimate("b", column);
+  EXPECT_DOUBLE_EQ(e.value, 50.5);
+  // The variance of 1..n is n (n + 1) / 12; 1.96 deviations of a mean of a hundred.
+  const double half = 1.959964 * std::sqrt(100.0 * 101.0 / 12.0 / 100.0);
+  EXPECT_NEAR(e.low, 50.5 - half, 1e-4);
+  EXPECT_NEAR(e.high, 50.5 + half, 1e-4);
+  EXPECT_EQ(e.of, 100);
+  EXPECT_EQ(e.without, 3);
+}
+
+TEST(Figure, IsAProbabilityWithWilsonsInterval) {
+  // Brown, Cai, DasGupta (2001), by hand: 0 of 10, 5 of 10, 10 of 10.
+  const auto of = [](int hits) {
+    std::vector<std::string> column(10, "1.0");
+    std::fill_n(column.begin(), hits, "3.0");
+    return estimate("b>2", column);
+  };
+  EXPECT_NEAR(of(0).low, 0.0, 1e-12);
+  EXPECT_NEAR(of(0).high, 0.2775, 1e-4);
+  EXPECT_NEAR(of(5).low, 0.2366, 1e-4);
+  EXPECT_NEAR(of(5).high, 0.7634, 1e-4);
+  EXPECT_NEAR(of(10).low, 0.7225, 1e-4);
+  EXPECT_EQ(of(3).value, 0.3);
+  EXPECT_DOUBLE_EQ(estimate("b<2", {"1", "2", "3"}).value, 1.0 / 3.0);
+  EXPECT_NEAR(estimate("b<2", {}).low, 0.0, 1e-12);
+  EXPECT_NEAR(estimate("b<2", {}).high, 1.0, 1e-12);
+  for (const char* bad : {"", ">1", "b>", "b>x", "b>nan", "c"})
+    EXPECT_THROW(estimate(bad, {}), InputError) << bad;
+}
+
+TEST(Figure, HoldsWhereItSaysInNineteenOfTwenty) {
+  // A drawn mass ratio above a limit, whose probability is known, from 0.3 to 0.01.
+  for (const double p : {0.3, 0.1, 0.01}) {
+    int inside = 0;
+    constexpr int kSweeps = 400;
+    for (int s = 0; s < kSweeps; ++s) {
+      SweepPlan plan;
+      plan.draw("k=0:1");
+      plan.repeat(500);
+      plan.seed(static_cast<std::uint64_t>(s));
+      Figure figure(fmt::format("k<{}", p));
+      figure.find({"k"});
+      for (int run = 0; run < 500; ++run) figure.add({plan.overrides(run)[0].substr(2)});
+      const Figure::Estimate e = figure.estimate();
+      inside += e.low <= p && p <= e.high;
+    }
+    EXPECT_NEAR(inside / double{kSweeps}, 0.95, 0.04) << p;
+  }
+}
+
 class Sweep : public test::Programs {
  protected:
   static constexpr const char* kRuns =
@@ -131,6 +277,40 @@ TEST_F(Sweep, RowsDoNotDependOnTheWorkersNorOnAKill) {
                         << line[4].substr(0, 20);
   ASSERT_EQ(sweep(kRuns + out("three")).status, 0);
   EXPECT_EQ(csv("three"), all);
+}
+
+TEST_F(Sweep, EndsWhereItsFigureIsKnownWellEnough) {
+  const std::string runs =
+      "free_decay --set 'program=[{move: {to: {x_m: 0.001}}}]' --draw "
+      "plant_mismatch.gain_extend=0.9:1.1 --runs 400 --figure 'plant_mismatch.gain_extend>1.05' ";
+  const test::Output one = sweep(runs + "--until 0.07" + out("one") + "--workers 1");
+  ASSERT_EQ(one.status, 0) << one.text;
+  ASSERT_EQ(sweep(runs + "--until 0.07" + out("three") + "--workers 3").status, 0);
+  EXPECT_EQ(csv("one"), csv("three"));
+  const auto some = rows(folder_ / "one/sweep.csv");
+  const std::size_t n = some.size();
+  EXPECT_TRUE(n >= 100 && n < 400 && n % 50 == 0) << n;
+  // By hand: sqrt(p (1 - p) / n) is within, and was not before.
+  double hits = 0.0, before = 0.0;
+  for (std::size_t i = 0; i < n; ++i) {
+    const bool hit = std::stod(some[i].at("plant_mismatch.gain_extend")) > 1.05;
+    hits += hit;
+    if (i < n - 50) before += hit;
+  }
+  const auto half = [](double count, double of) {
+    return 1.96 * std::sqrt(count / of * (1.0 - count / of) / of);
+  };
+  const auto of = static_cast<double>(n);
+  EXPECT_LT(half(hits, of), 0.072);
+  if (n > 100) {
+    EXPECT_GT(half(before, of - 50.0), 0.068);
+  }
+  EXPECT_NE(one.text.find(fmt::format("gain_extend>1.05: {:.4g}, ", hits / of)), std::string::npos)
+      << one.text;
+  // The same runs come first where more are asked for.
+  ASSERT_EQ(sweep(runs + "--until 0.06" + out("one")).status, 0);
+  EXPECT_GT(rows(folder_ / "one/sweep.csv").size(), n);
+  EXPECT_EQ(csv("one").compare(0, csv("three").size(), csv("three")), 0);
 }
 
 TEST_F(Sweep, RowIsWhatRunSaysOfTheSameValues) {
@@ -185,6 +365,14 @@ TEST_F(Sweep, RefusesByName) {
     EXPECT_NE(o.text.find(line), std::string::npos) << o.text;
   };
   refused("z_sine" + out("s"), "one run only");
+  refused("z_sine --vary seed=1,2 --until 0.1" + out("s"), "--until requires --figure");
+  refused("z_sine --vary seed=1,2 --figure nothing" + out("s"), "--figure 'nothing': no such");
+  refused("z_sine --vary seed=1,2 --figure 'seed>x'" + out("s"), "--figure 'seed>x': want COLUMN");
+  refused("z_sine --vary seed=1,2 --design sobol" + out("s"), "--design: places draws");
+  refused("z_sine --vary seed=1,2 --design best" + out("s"), "--design");
+  refused("z_sine --draw plant_mismatch.tau=0.9:1 --runs 4 --design latin --figure seed --until 1" +
+              out("s"),
+          "--until: fewer runs are no such design");
   refused("z_sine --vary legs.K_Q=1,2" + out("s"), "legs.K_Q: unknown key");
   refused("z_sine --vary legs.K_P=1,-2" + out("s"), "legs.K_P: '-2'");  // the last one, too
   refused("nothing --vary legs.K_P=1,2" + out("s"), "nothing");

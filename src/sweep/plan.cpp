@@ -2,16 +2,20 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <charconv>
-#include <cmath>
+#include <gsl/gsl_qrng.h>
 
+#include <cmath>
+#include <memory>
+#include <utility>
+
+#include "number.hpp"
 #include "ves/sweep/sweep.hpp"
 
 namespace ves {
 namespace {
 
 /// splitmix64: a stream of its own for every run and key.
-double uniform(std::uint64_t seed, std::uint64_t run, std::uint64_t key) {
+std::uint64_t mixed(std::uint64_t seed, std::uint64_t run, std::uint64_t key) {
   std::uint64_t z = seed * 0x9e3779b97f4a7c15u + run * 0xbf58476d1ce4e5b9u + key;
   for (int i = 0; i < 2; ++i) {
     z += 0x9e3779b97f4a7c15u;
@@ -19,12 +23,27 @@ double uniform(std::uint64_t seed, std::uint64_t run, std::uint64_t key) {
     z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
     z ^= z >> 31;
   }
-  return static_cast<double>(z >> 11) * 0x1p-53;
+  return z;
+}
+double uniform(std::uint64_t seed, std::uint64_t run, std::uint64_t key) {
+  return static_cast<double>(mixed(seed, run, key) >> 11) * 0x1p-53;
 }
 
-bool toNumber(const std::string& text, double& x) {
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), x);
-  return error == std::errc() && end == text.data() + text.size() && std::isfinite(x);
+constexpr std::uint32_t kPointBits = 30;  // [-] of GSL's Sobol points
+
+/// Where i goes among n, each somewhere else: a Feistel network over the next power of four, gone
+/// through until it is one of them.
+std::uint64_t shuffled(std::uint64_t i, std::uint64_t n, std::uint64_t key) {
+  std::uint64_t half = 1;
+  while ((std::uint64_t{1} << (2 * half)) < n) ++half;
+  const std::uint64_t mask = (std::uint64_t{1} << half) - 1;
+  do {
+    std::uint64_t left = i >> half, right = i & mask;
+    for (std::uint64_t round = 0; round < 6; ++round)
+      left = std::exchange(right, left ^ (mixed(key, right, round) & mask));
+    i = (left << half) | right;
+  } while (i >= n);
+  return i;
 }
 
 std::vector<std::string> split(const std::string& text, char at) {
@@ -108,7 +127,46 @@ std::string SweepPlan::text() const {
   for (const Varied& v : varied_)
     out += fmt::format("vary {}={}\n", v.key, fmt::join(v.values, ","));
   for (const Drawn& d : drawn_) out += fmt::format("draw {}={}:{}\n", d.key, d.from, d.to);
+  if (design_ == SweepDesign::kLatin) out += "a Latin hypercube\n";
+  if (design_ == SweepDesign::kSobol) out += "Sobol's points\n";
   return out;
+}
+
+void SweepPlan::lay(SweepDesign design) {
+  constexpr std::size_t kMostKeys = 40, kMostNumbers = 100'000'000;  // GSL's; 400 MB
+  design_ = design;
+  if (design != SweepDesign::kUniform && (drawn_.empty() || draws_ == 1))
+    throw InputError("--design: places draws, want --draw, and --runs of more than one");
+  if (design != SweepDesign::kSobol) return;
+  const std::size_t keys = drawn_.size(), runs = static_cast<std::size_t>(draws_);
+  if (keys > kMostKeys || runs * keys > kMostNumbers)
+    throw InputError(
+        fmt::format("--design sobol: {} keys and {} runs, want at most {} keys, and {} "
+                    "runs times keys",
+                    keys, runs, kMostKeys, kMostNumbers));
+  points_.assign(keys, 0);  // the first, which GSL leaves out
+  points_.reserve(runs * keys);
+  const std::unique_ptr<gsl_qrng, void (*)(gsl_qrng*)> sobol(
+      gsl_qrng_alloc(gsl_qrng_sobol, static_cast<unsigned>(keys)), gsl_qrng_free);
+  std::vector<double> point(keys);
+  while (points_.size() < runs * keys) {
+    gsl_qrng_get(sobol.get(), point.data());
+    for (const double x : point)
+      points_.push_back(static_cast<std::uint32_t>(std::ldexp(x, kPointBits)));
+  }
+}
+
+/// Of one combination's draws each key has its own order or digits.
+double SweepPlan::share(std::int64_t run, std::size_t key) const {
+  const auto number = static_cast<std::uint64_t>(run), draws = static_cast<std::uint64_t>(draws_),
+             nth = number % draws;
+  const double within = uniform(seed_, number, key + 1);
+  if (design_ == SweepDesign::kUniform) return within;
+  const std::uint64_t own = mixed(seed_, number / draws, ~static_cast<std::uint64_t>(key));
+  if (design_ == SweepDesign::kLatin)
+    return (static_cast<double>(shuffled(nth, draws, own)) + within) / static_cast<double>(draws_);
+  const std::uint32_t digits = static_cast<std::uint32_t>(own >> (64 - kPointBits));
+  return std::ldexp((points_[nth * drawn_.size() + key] ^ digits) + within, -int{kPointBits});
 }
 
 std::vector<std::string> SweepPlan::overrides(std::int64_t run) const {
@@ -122,8 +180,7 @@ std::vector<std::string> SweepPlan::overrides(std::int64_t run) const {
   const auto number = static_cast<std::uint64_t>(run);
   for (std::size_t i = 0; i < drawn_.size(); ++i) {
     const Drawn& d = drawn_[i];
-    out.push_back(
-        fmt::format("{}={}", d.key, d.from + (d.to - d.from) * uniform(seed_, number, i + 1)));
+    out.push_back(fmt::format("{}={}", d.key, d.from + (d.to - d.from) * share(run, i)));
   }
   if (keys().size() > out.size())
     out.push_back(fmt::format(

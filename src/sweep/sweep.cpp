@@ -64,13 +64,19 @@ constexpr const char* kNumbers[] = {"simulated_s",
                                     "contact_restitution_free_space",
                                     "contact_energy_error"};
 
-/// How many cells a line of CSV has.
-std::ptrdiff_t cells(const std::string& line) {
+/// The cells of a line of CSV.
+std::vector<std::string> cells(const std::string& line) {
+  std::vector<std::string> out(1);
   bool inside = false;
-  return 1 + std::count_if(line.begin(), line.end(), [&](char c) {
-           if (c == '"') inside = !inside;
-           return c == ',' && !inside;
-         });
+  for (const char c : line) {
+    if (c == '"')
+      inside = !inside;
+    else if (c == ',' && !inside)
+      out.emplace_back();
+    else
+      out.back() += c;
+  }
+  return out;
 }
 
 std::string headerOf(const SweepPlan& plan) {
@@ -139,6 +145,7 @@ std::map<std::int64_t, std::string> readRows(const fs::path& file, const std::st
   std::ifstream in(file, std::ios::binary);
   if (!in) return rows;
   const std::string text((std::istreambuf_iterator<char>(in)), {});
+  const std::size_t columns = cells(header).size();
   std::size_t at = 0;
   for (int line = 1; at < text.size(); ++line) {
     const std::size_t end = text.find('\n', at);
@@ -154,7 +161,7 @@ std::map<std::int64_t, std::string> readRows(const fs::path& file, const std::st
     std::int64_t run = -1;
     const auto [stop, error] = std::from_chars(row.data(), row.data() + row.size(), run);
     const bool number = error == std::errc() && stop != row.data() + row.size() && *stop == ',';
-    if (!number || run < 0 || run >= runs || cells(row) != cells(header))
+    if (!number || run < 0 || run >= runs || cells(row).size() != columns)
       throw InputError(fmt::format("{}:{}: no row of this sweep of {} runs; --out another folder",
                                    file.string(), line, runs));
     rows[run] = row;
@@ -177,6 +184,39 @@ void writeRows(const fs::path& file, const std::string& header,
 
 bool good(const std::string& row) { return row.find(",parked,none,") != std::string::npos; }
 
+/// Of the rows from the first on, as far as there is one after the other.
+class FigureWatch {
+ public:
+  static constexpr std::int64_t kEach = 50;  // [-] rows, after which it is looked at
+
+  FigureWatch(const SweepOptions& options, const std::string& header)
+      : figure_(options.figure), until_(options.until) {
+    if (figure_) figure_->find(cells(header));
+  }
+  /// Enough rows: from this run on none is needed.
+  bool enough(const std::map<std::int64_t, std::string>& rows) {
+    constexpr std::int64_t kLeast = 100;  // [-] rows, of which a normal distribution may be spoken
+    if (!figure_ || enough_) return enough_;
+    for (auto row = rows.find(next_); row != rows.end() && row->first == next_; ++row) {
+      figure_->add(cells(row->second));
+      ++next_;
+      enough_ = until_ > 0.0 && next_ >= kLeast && next_ % kEach == 0 &&
+                figure_->estimate().half() <= until_;
+      if (enough_) return true;
+    }
+    return false;
+  }
+  std::optional<Figure::Estimate> estimate() const {
+    return figure_ ? std::optional(figure_->estimate()) : std::nullopt;
+  }
+
+ private:
+  std::optional<Figure> figure_;
+  double until_;
+  std::int64_t next_ = 0;
+  bool enough_ = false;
+};
+
 fs::path partOf(const SweepOptions& options, int rank) {
   if (options.ranks == 1) return options.file;
   return fmt::format("{}.rank{}", options.file.string(), rank);
@@ -189,6 +229,7 @@ SweepResult sweep(const SweepPlan& plan, const SweepOptions& options,
                   const std::function<bool()>& stop) {
   const std::int64_t runs = plan.size();
   const std::string header = headerOf(plan);
+  FigureWatch watch(options, header);
   const fs::path part = partOf(options, options.rank);
   // Two of them in one file would run everything twice.
   const int lock = open((part.string() + ".lock").c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0644);
@@ -214,23 +255,29 @@ SweepResult sweep(const SweepPlan& plan, const SweepOptions& options,
     ReferenceMotions references;
     std::mutex writing;
     tbb::task_arena workers(options.workers);
-    workers.execute([&] {
-      tbb::parallel_for_each(missing, [&](std::int64_t run) {
-        if (stop()) return;
-        const std::string row = rowOf(plan, scenario, run, references);
-        const std::lock_guard lock_rows(writing);
-        out << row << '\n' << std::flush;
-        if (!out) throw InputError(part.string() + ": cannot be written");
-        ++progress.done;
-        ++progress.run_now;
-        progress.elapsed = static_cast<double>(monotonicNow() - start) * kSecondPerNanosecond;
-        if (shown) shown(progress);
+    const auto all = std::ssize(missing), each = options.until > 0.0 ? FigureWatch::kEach : all;
+    for (std::int64_t from = 0; from < all && !watch.enough(rows) && !stop(); from += each) {
+      const auto first = missing.begin() + from, last = first + std::min(each, all - from);
+      workers.execute([&] {
+        tbb::parallel_for_each(first, last, [&](std::int64_t run) {
+          if (stop()) return;
+          const std::string row = rowOf(plan, scenario, run, references);
+          const std::lock_guard lock_rows(writing);
+          out << row << '\n' << std::flush;
+          if (!out) throw InputError(part.string() + ": cannot be written");
+          if (options.until > 0.0) rows[run] = row;
+          ++progress.done;
+          ++progress.run_now;
+          progress.elapsed = static_cast<double>(monotonicNow() - start) * kSecondPerNanosecond;
+          if (shown) shown(progress);
+        });
       });
-    });
+    }
   }
 
   // In order, and of all ranks when the others are done too.
   rows = readRows(part, header, runs);
+  const bool enough = watch.enough(rows);
   writeRows(part, header, rows);
   if (options.ranks > 1) {
     rows.clear();
@@ -240,7 +287,9 @@ SweepResult sweep(const SweepPlan& plan, const SweepOptions& options,
   }
   SweepResult result;
   result.rows = std::ssize(rows);
-  result.complete = result.rows == runs;
+  result.complete = enough || result.rows == runs;
+  if (options.ranks > 1 && result.complete) watch.enough(rows);
+  result.figure = watch.estimate();
   for (const auto& [run, row] : rows) result.not_good += !good(row);
   close(lock);
   if (options.ranks == 1 || result.complete) unlink((part.string() + ".lock").c_str());

@@ -9,8 +9,14 @@
 #include <vector>
 
 #include "ves/config/experiment.hpp"
+#include "ves/sweep/figure.hpp"
 
 namespace ves {
+
+/// How the draws of a combination lie: each for itself; as a Latin hypercube, with one in each of
+/// so many parts of every key's range; as Sobol's points, which leave no part of all keys' ranges
+/// out, with digits exchanged at random. The last two know how many runs there will be.
+enum class SweepDesign { kUniform, kLatin, kSobol };
 
 /// The runs of a sweep: every combination of the varied values, `draws` times.
 class SweepPlan {
@@ -22,6 +28,8 @@ class SweepPlan {
   /// Runs of each combination, each with a noise seed of its own unless `seed` is varied.
   void repeat(std::int64_t draws) { draws_ = draws; }
   void seed(std::uint64_t seed) { seed_ = seed; }
+  /// After all of that. Throws InputError where Sobol's points are too many.
+  void lay(SweepDesign design);
 
   /// [-] Throws InputError beyond a thousand million.
   std::int64_t size() const;
@@ -42,10 +50,14 @@ class SweepPlan {
     std::string key;
     double from = 0.0, to = 0.0;
   };
+  double share(std::int64_t run, std::size_t key) const;  // [-] of a key's range
+
   std::vector<Varied> varied_;
   std::vector<Drawn> drawn_;
   std::int64_t draws_ = 1;
   std::uint64_t seed_ = 1;
+  SweepDesign design_ = SweepDesign::kUniform;
+  std::vector<std::uint32_t> points_;  // Sobol's, of kPointBits, a run's after another
 };
 
 struct SweepOptions {
@@ -54,6 +66,8 @@ struct SweepOptions {
   std::filesystem::path file;          // CSV; what it has already is not run again
   int workers = 1;                     // [-] runs at a time
   int rank = 0, ranks = 1;             // [-] of several sweeps that share the runs and a folder
+  std::optional<Figure> figure;        // that is told of all rows
+  double until = 0.0;                  // half of its interval, at which it is enough; 0: never
 };
 
 struct SweepProgress {
@@ -65,7 +79,8 @@ struct SweepProgress {
 struct SweepResult {
   std::int64_t rows = 0;      // [-] in the file
   std::int64_t not_good = 0;  // [-] of them: stopped by a check, refused, or not a valid scenario
-  bool complete = false;      // the file has all runs, in order
+  bool complete = false;      // the file has all runs, in order, or as many as are enough
+  std::optional<Figure::Estimate> figure;
 };
 
 /// Runs what is missing. `stop` is looked at before every run; it and `shown` may be called
