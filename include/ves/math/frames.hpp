@@ -8,6 +8,8 @@
 //   S   force-torque sensor, fixed in P (180 degrees about x: its z axis points down)
 //   R   centre of the robot's adapter plate, fixed in P
 //   L0..Ln  links of the robot; L0 is its base
+//   E   inertial, where a vehicle is emulated; it is I unless the laboratory flies along with it
+//   H   the laboratory, at P's home, in I's axes
 //
 // Monogram notation, as in Drake: R_IP turns the coordinates of P into those of I, X_IP is the pose
 // of P in I, p_PS_P the position of So from Po expressed in P, w_IP_I the angular velocity of P in
