@@ -321,6 +321,25 @@ TEST(Flight, TicksThatComeLateShowNoLeap) {
   EXPECT_LT(most, 0.03);  // [m] what the robot's motion shows
 }
 
+TEST(Flight, APushOnWhatFloatsIsInTheLaboratory) {
+  const Experiment e = test::experiment(
+      "servicer_capture",
+      {"controller.moving_frame.enabled=true", "base.free.rate_deg_per_s=[0, 0, 20]",
+       "program=!replace [{move: {}}, {calibration: {}}, {admittance: {duration_s: 8}}]"});
+  Lockstep loop(e.controller, e.plant);
+  loop.step({Request::kStart, {}, {}});
+  for (int i = 0; i < 600; ++i) loop.step();
+  const Mat3 R_EI = loop.state().command.laboratory.E_H.X.R;
+  ASSERT_GT(rotationVector(R_EI).norm(), 1.0);
+  const Vec3 before = loop.plant().truth().target.v;
+  constexpr double kForce = 10.0, kTime = 0.1;  // [N], [s]
+  ASSERT_TRUE(loop.plant().moveRobot(
+      Push{Push::On::kTarget, -1, Vec3::Zero(), kForce * Vec3::UnitX(), kTime}));
+  for (int i = 0; i < 20; ++i) loop.step();
+  const double dv = kForce * kTime / e.plant.task.world->environment.target->mass;
+  EXPECT_LT((loop.plant().truth().target.v - before - dv * R_EI.col(0)).norm(), 0.05 * dv);
+}
+
 TEST(Flight, KeepsSteadyWhileSomethingIsFelt) {
   const RecordedRun run = recordLockstep(
       test::experiment("servicer_capture",

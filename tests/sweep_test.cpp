@@ -313,6 +313,18 @@ TEST_F(Sweep, EndsWhereItsFigureIsKnownWellEnough) {
   EXPECT_EQ(csv("one").compare(0, csv("three").size(), csv("three")), 0);
 }
 
+TEST_F(Sweep, KnowsNothingOfAFigureThatFewRunsHave) {
+  // A column that is empty in every row: nothing is known, however many rows there are.
+  const test::Output o = sweep(
+      "free_decay --set 'program=[{move: {to: {x_m: 0.001}}}]' --draw "
+      "plant_mismatch.gain_extend=0.9:1.1 --runs 150 --figure contact_restitution --until 1" +
+      out("s"));
+  ASSERT_EQ(o.status, 0) << o.text;
+  EXPECT_EQ(rows(folder_ / "s/sweep.csv").size(), 150u);
+  EXPECT_NE(o.text.find("of 0 runs; 150 have none"), std::string::npos) << o.text;
+  EXPECT_NE(o.text.find("not within 1: want more --runs"), std::string::npos) << o.text;
+}
+
 TEST_F(Sweep, RowIsWhatRunSaysOfTheSameValues) {
   ASSERT_EQ(sweep("z_sine --vary legs.K_P=8000,9000 --vary seed=3,4" + out("s")).status, 0);
   for (const auto& row : rows(folder_ / "s/sweep.csv")) {

@@ -52,6 +52,10 @@ Motion shown(const Series& series, Motion motion) {
   eachTick(series, [&](const Row& row, double) { rows.push_back(&row); });
   if (rows.empty()) return motion;
   const std::int64_t first = rows.front()->state.header.sequence;
+  // No laboratory flew any farther.
+  const auto flown = static_cast<std::size_t>(rows.back()->state.header.sequence - first) + 2;
+  for (auto* list : {&motion.x, &motion.x_dot}) list->resize(std::min(list->size(), flown));
+  motion.t.resize(std::min(motion.t.size(), flown));
   std::size_t row = 0;
   for (std::size_t k = 0; k < motion.x.size(); ++k) {
     const std::int64_t tick = first + static_cast<std::int64_t>(k);

@@ -103,7 +103,11 @@ void LiveRun::takeState(const state_t& state) {
   const auto row = rows_.add(state);
   if (!row || !scene_) return;
   row_ = *row;
-  if (let_go_ && let_go_->pushes.add(*row)) let_go_->computed = false;
+  if (let_go_ && let_go_->pushes.add(*row)) {
+    let_go_->computed = false;
+    // It is in the laboratory's axes, and the base would take it in its own.
+    let_go_->changed |= experiment_ && experiment_->controller.moving_frame.enabled;
+  }
   // Who joins late has the same time.
   row_->t = static_cast<double>(row_->state.header.sequence * experiment_->controller.period) *
             kSecondPerNanosecond;

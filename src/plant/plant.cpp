@@ -85,7 +85,7 @@ Plant::Plant(const PlantConfig& config)
 
 void Plant::command(const LegCommand& command) noexcept {
   watchdog_.take(command, now_);
-  if (command.laboratory.flies()) laboratory_ = command.laboratory;
+  laboratory_ = command.laboratory;
   if (!command.engaged) return;
   if (command.segment < 0) {  // an operator's order: what the program began goes on
     outside_ = true;
@@ -343,8 +343,9 @@ Wrench Plant::meetWorld(double dt) noexcept {
   if (held) target.v = target.w = Vec3::Zero();
   if (truth_.push && truth_.push->push.on == Push::On::kTarget &&
       truth_.push->share(last_step_ - std::llround(dt * 1e9), now_) > 0.0) {
-    const Wrench on_target_Bo_I = pushed(last_step_ - std::llround(dt * 1e9));
-    const FloatingRates with = rates(world.environment, target, on_target_Bo_I),
+    const Mat3 R_EI = laboratory_.flies() ? laboratory_.at(now_).X.R : Mat3(Mat3::Identity());
+    const Wrench on_target_Bo_E = rotate(R_EI, pushed(last_step_ - std::llround(dt * 1e9)));
+    const FloatingRates with = rates(world.environment, target, on_target_Bo_E),
                         without = rates(world.environment, target, Wrench{});
     target.v += dt * (with.v - without.v);
     target.w += dt * (with.w - without.w);

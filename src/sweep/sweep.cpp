@@ -195,13 +195,15 @@ class FigureWatch {
   }
   /// Enough rows: from this run on none is needed.
   bool enough(const std::map<std::int64_t, std::string>& rows) {
-    constexpr std::int64_t kLeast = 100;  // [-] rows, of which a normal distribution may be spoken
+    constexpr std::int64_t kLeast =
+        100;  // [-] values, of which a normal distribution may be spoken
     if (!figure_ || enough_) return enough_;
     for (auto row = rows.find(next_); row != rows.end() && row->first == next_; ++row) {
       figure_->add(cells(row->second));
       ++next_;
-      enough_ = until_ > 0.0 && next_ >= kLeast && next_ % kEach == 0 &&
-                figure_->estimate().half() <= until_;
+      if (!(until_ > 0.0) || next_ % kEach != 0) continue;
+      const Figure::Estimate now = figure_->estimate();
+      enough_ = now.of >= kLeast && now.half() <= until_;
       if (enough_) return true;
     }
     return false;
