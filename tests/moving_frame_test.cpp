@@ -340,6 +340,14 @@ TEST(Flight, APushOnWhatFloatsIsInTheLaboratory) {
   EXPECT_LT((loop.plant().truth().target.v - before - dv * R_EI.col(0)).norm(), 0.05 * dv);
 }
 
+TEST(Flight, WhatIsFeltIsKnownAfterACalibration) {
+  const std::string steady = "controller.moving_frame.steady_in_contact=true",
+                    program = "program=!replace [{move: {}}, {admittance: {duration_s: 5}}]";
+  EXPECT_NO_THROW(test::experiment("satellite_tumbling", {steady}));
+  EXPECT_NO_THROW(test::experiment("satellite_tumbling", {program}));
+  EXPECT_THROW(test::experiment("satellite_tumbling", {steady, program}), InputError);
+}
+
 TEST(Flight, KeepsSteadyWhileSomethingIsFelt) {
   const RecordedRun run = recordLockstep(
       test::experiment("servicer_capture",

@@ -60,6 +60,15 @@ void requireFrameFits(Section& root, const ControllerConfig& c, const RobotTask&
     refuse(
         "this base stays where it is, and the laboratory need not move; want a base that is "
         "'free', or false");
+  const auto* end = c.program.segments.begin() + c.program.size;
+  const bool calibrated = std::any_of(c.program.segments.begin(), end, [](const Segment& s) {
+    return s.kind == SegmentKind::kCalibration;
+  });
+  if (c.moving_frame.steady_in_contact && !calibrated)
+    root.section("controller")
+        .section("moving_frame")
+        .fail("steady_in_contact",
+              "what is felt is known after a calibration, want one in the program, or false");
   for (const RobotEvent& event : task.robot_events)
     if (std::holds_alternative<Push>(event.action))
       refuse("a push is in the laboratory's axes, and would turn with it; want no push, or false");
