@@ -45,8 +45,7 @@ void MovingFrame::step(const PathPoint<6>& shown, const BodyMotion& E_P, double 
 }
 
 void MovingFrame::yield(const BodyMotion& E_P, const PathPoint<6>& shown) noexcept {
-  const BodyMotion H = relative(motionOf(shown), BodyMotion{});  // of H in P, in P's axes
-  const BodyMotion moved = composed(E_P, H);
+  const BodyMotion moved = composed(E_P, inverse(motionOf(shown)));
   E_H_.X = {orthogonal(moved.X.R), moved.X.p};
   E_H_.v = moved.v;
   E_H_.w = moved.w;
@@ -67,7 +66,6 @@ Emulated MovingFrame::emulated(const Mat3& R_IP) const noexcept {
 Emulated MovingFrame::emulated(const Mat3& R_IP, const BodyMotion& E_P,
                                double since) const noexcept {
   Emulated out = emulated(R_IP);
-  if (!settings_.enabled) return out;
   out.R_EP = rotationOf(since * E_P.w) * E_P.X.R;
   out.R_EI = out.R_EP * R_IP.transpose();
   return out;

@@ -195,8 +195,7 @@ class FigureWatch {
   }
   /// Enough rows: from this run on none is needed.
   bool enough(const std::map<std::int64_t, std::string>& rows) {
-    constexpr std::int64_t kLeast =
-        100;  // [-] values, of which a normal distribution may be spoken
+    constexpr std::int64_t kLeast = 100;  // [-] values that an interval is told of
     if (!figure_ || enough_) return enough_;
     for (auto row = rows.find(next_); row != rows.end() && row->first == next_; ++row) {
       figure_->add(cells(row->second));

@@ -59,7 +59,8 @@ class AdmittanceControl {
   const MovingFrame& frame() const noexcept { return frame_; }
   /// How a platform turned by R_IP is emulated; `since` [s]: of a wrench after the last step's.
   Emulated emulated(const Mat3& R_IP, double since) const noexcept {
-    return frame_.emulated(R_IP, model_.atWrench(), since);
+    return frame_.enabled() ? frame_.emulated(R_IP, model_.atWrench(), since)
+                            : frame_.emulated(R_IP);
   }
 
   const Oscillation& oscillation() const noexcept { return oscillation_; }

@@ -31,7 +31,6 @@ class Figure {
   /// A mean by the normal distribution, a probability by Wilson's interval, which holds for rare
   /// ones too. Of nothing: everything is possible.
   Estimate estimate() const;
-  const std::string& text() const { return text_; }
 
  private:
   std::string text_, column_;
