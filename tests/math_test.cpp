@@ -9,9 +9,11 @@
 #include <unsupported/Eigen/MatrixFunctions>
 
 #include "support/poses.hpp"
+#include "ves/kinematics/stewart.hpp"
 #include "ves/math/butterworth.hpp"
 #include "ves/math/dense.hpp"
 #include "ves/math/frames.hpp"
+#include "ves/math/lu6.hpp"
 #include "ves/math/quintic.hpp"
 #include "ves/math/second_order.hpp"
 
@@ -302,6 +304,40 @@ TEST_P(Dense, SolvePositive) {
   const Eigen::MatrixXd half = draw(n, n), B = draw(n, 2);
   const Eigen::MatrixXd A = half * half.transpose() + Eigen::MatrixXd::Identity(n, n);
   EXPECT_LT((A * solvePositive(A, B) - B).norm(), 1e-11);
+}
+
+/// Rows that have to be exchanged, by a first column of zeros above an entry, and in no order.
+TEST(Lu6, SolvesWhatEigenSolves) {
+  std::mt19937 generator(11);
+  std::normal_distribution<double> normal;
+  for (int n = 0; n < 200; ++n) {
+    Mat6 A = Mat6::NullaryExpr([&] { return normal(generator); });
+    if (n % 2) A.topLeftCorner(5, 1).setZero();
+    const Motions B = Motions::NullaryExpr([&] { return normal(generator); });
+    const Eigen::ColPivHouseholderQR<Mat6> qr(A);
+    const double tolerance = 1e-14 * A.norm() * qr.inverse().norm();
+    const Lu6 lu(A);
+    ASSERT_TRUE(lu.regular());
+    EXPECT_LT((lu.solve(B) - qr.solve(B)).norm(), tolerance * qr.solve(B).norm());
+    EXPECT_LT((lu.inverse() * A - Mat6::Identity()).norm(), 6.0 * tolerance);
+  }
+}
+
+TEST(Lu6, KnowsAMatrixThatHasNoInverse) {
+  std::mt19937 generator(12);
+  std::normal_distribution<double> normal;
+  const Mat6 whole = Mat6::NullaryExpr([&] { return normal(generator); });
+  EXPECT_FALSE(Lu6(Mat6::Zero()).regular());
+  for (int i = 0; i < 6; ++i) {
+    Mat6 A = whole;
+    A.col(i) = A.col((i + 1) % 6) + 2.0 * A.col((i + 2) % 6);
+    EXPECT_FALSE(Lu6(A).regular()) << i;
+    for (int j = 0; j < 6; ++j) {
+      A = whole;
+      A(i, j) = NAN;
+      EXPECT_FALSE(Lu6(A).regular()) << i << j;
+    }
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Sizes, Dense, testing::Values(2, 6, 40));

@@ -94,9 +94,10 @@ TEST_P(Shipped, NothingStopsItInTheWorkspaceItsLimitsAreDerivedFrom) {
   for (int n = 0; n < 2000; ++n) {
     const Transform X = p.geometry.fromHome(corner());
     EXPECT_TRUE(actuatorLimitsCheck(p.limits, legLengths(p.geometry, X)));
-    EXPECT_TRUE(axes.check(p.limits, p.geometry, X));
-    EXPECT_TRUE(collideCheck(p.limits, p.geometry, X));
-    EXPECT_TRUE(conditioningCheck(p.limits, p.geometry, X));
+    const LegLines lines = legLines(p.geometry, X);
+    EXPECT_TRUE(axes.check(p.limits, X.R, lines));
+    EXPECT_TRUE(collideCheck(p.limits, p.geometry, X, lines));
+    EXPECT_TRUE(conditioningCheck(p.limits, lines, jointRadius(p.geometry)));
   }
   for (int i = 0; i < 6; ++i)
     for (const double sign : {-1.0, 1.0}) {

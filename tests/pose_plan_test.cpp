@@ -106,7 +106,8 @@ TEST(PosePlan, KeepsTheLegsApartAndInsideTheirStroke) {
     double shortest = HUGE_VAL;
     for (const PosePlan::Attitude& a : plan.attitudes) {
       const Transform X = e.controller.geometry.fromHome({Vec3::Zero(), a.rpy});
-      EXPECT_TRUE(collideCheck(limits, e.controller.geometry, X));
+      EXPECT_TRUE(
+          collideCheck(limits, e.controller.geometry, X, legLines(e.controller.geometry, X)));
       shortest = std::min(shortest, legLengths(e.controller.geometry, X).minCoeff());
     }
     return shortest;

@@ -21,6 +21,18 @@ constexpr double kPeriod = 0.01;  // [s]
 using test::experiment;
 using test::kNan;
 
+// Those of a pose.
+bool clearAt(const SafetyLimits& limits, const Geometry& g, const Transform& X_IP) {
+  return collideCheck(limits, g, X_IP, legLines(g, X_IP));
+}
+bool conditionedAt(const SafetyLimits& limits, const Geometry& g, const Transform& X_IP) {
+  return conditioningCheck(limits, legLines(g, X_IP), jointRadius(g));
+}
+bool inCones(const JointAxes& axes, const SafetyLimits& limits, const Geometry& g,
+             const Transform& X_IP) {
+  return axes.check(limits, X_IP.R, legLines(g, X_IP));
+}
+
 class SafetyChecks : public testing::Test {
  protected:
   const Experiment e_ = experiment("z_sine");
@@ -65,27 +77,27 @@ TEST_F(SafetyChecks, EveryLegsJointsHaveACone) {
       (base ? leans.p_IBi_I : leans.p_PPi_P)[i] += Vec3(0.9, 0.9, 0.0);
       SafetyLimits limits = l_;
       limits.joint_cone = 25 * kDegree;
-      EXPECT_TRUE(axes.check(limits, g_, g_.fromHome({})));
-      EXPECT_FALSE(axes.check(limits, leans, g_.fromHome({}))) << "leg " << i + 1;
+      EXPECT_TRUE(inCones(axes, limits, g_, g_.fromHome({})));
+      EXPECT_FALSE(inCones(axes, limits, leans, g_.fromHome({}))) << "leg " << i + 1;
     }
 }
 
 TEST_F(SafetyChecks, EveryLegAndEveryPairOfThemIsKeptClear) {
   const Transform home = g_.fromHome({});
-  ASSERT_TRUE(collideCheck(l_, g_, home));
+  ASSERT_TRUE(clearAt(l_, g_, home));
   SafetyLimits slopes = l_, distances = l_;
   slopes.leg_clearance = 0.0;
   distances.plate_angle = 0.0;
   for (std::size_t i = 0; i < kLegs; ++i) {
     Geometry flat = g_;  // one leg alone, far out: nearly level
     flat.p_IBi_I[i] += 40.0 * flat.p_IBi_I[i].normalized();
-    EXPECT_FALSE(collideCheck(slopes, flat, home)) << "leg " << i + 1;
+    EXPECT_FALSE(clearAt(slopes, flat, home)) << "leg " << i + 1;
     for (std::size_t j = i + 1; j < kLegs; ++j) {
       Geometry near = g_;  // one beside the other
       const Vec3 beside(0.1 * l_.leg_clearance, 0.0, 0.0);
       near.p_IBi_I[j] = g_.p_IBi_I[i] + beside;
       near.p_PPi_P[j] = g_.p_PPi_P[i] + beside;
-      EXPECT_FALSE(collideCheck(distances, near, home)) << "legs " << i + 1 << " and " << j + 1;
+      EXPECT_FALSE(clearAt(distances, near, home)) << "legs " << i + 1 << " and " << j + 1;
     }
   }
 }
@@ -131,9 +143,9 @@ TEST_F(SafetyChecks, JointLimits) {
   // A pure tilt turns the platform's joints by the tilt, and the legs a little.
   const Transform tilted = g_.fromHome({Vec3::Zero(), {20 * kDegree, 0.0, 0.0}});
   limits.joint_cone = 30 * kDegree;
-  EXPECT_TRUE(axes.check(limits, g_, tilted));
+  EXPECT_TRUE(inCones(axes, limits, g_, tilted));
   limits.joint_cone = 15 * kDegree;
-  EXPECT_FALSE(axes.check(limits, g_, tilted));
+  EXPECT_FALSE(inCones(axes, limits, g_, tilted));
   // A pure shift turns both ends alike: the angle of the most turned leg, by its cosine.
   const Transform shifted = g_.fromHome({{0.2, 0.0, 0.0}, Vec3::Zero()});
   double most = 0.0;
@@ -142,10 +154,10 @@ TEST_F(SafetyChecks, JointLimits) {
     most = std::max(most, std::acos(a.dot(b) / a.norm() / b.norm()));
   }
   limits.joint_cone = most * 1.001;
-  EXPECT_TRUE(axes.check(limits, g_, shifted));
+  EXPECT_TRUE(inCones(axes, limits, g_, shifted));
   limits.joint_cone = most * 0.999;
-  EXPECT_FALSE(axes.check(limits, g_, shifted));
-  EXPECT_FALSE(axes.check(l_, g_, {Mat3::Identity(), {kNan, 0.0, 1.35}}));
+  EXPECT_FALSE(inCones(axes, limits, g_, shifted));
+  EXPECT_FALSE(inCones(axes, l_, g_, {Mat3::Identity(), {kNan, 0.0, 1.35}}));
 }
 
 TEST_F(SafetyChecks, SegmentDistanceIsTheSmallestOfManyPoints) {
@@ -174,10 +186,10 @@ TEST_F(SafetyChecks, Collide) {
       least = std::min(least, segmentDistance(g_.p_IBi_I[i], home * g_.p_PPi_P[i], g_.p_IBi_I[j],
                                               home * g_.p_PPi_P[j]));
   limits.leg_clearance = least * 0.999;
-  EXPECT_TRUE(collideCheck(limits, g_, home));
+  EXPECT_TRUE(clearAt(limits, g_, home));
   limits.leg_clearance = least * 1.001;
-  EXPECT_FALSE(collideCheck(limits, g_, home));
-  EXPECT_FALSE(collideCheck(l_, g_, {Mat3::Identity(), {kNan, 0.0, 1.35}}));
+  EXPECT_FALSE(clearAt(limits, g_, home));
+  EXPECT_FALSE(clearAt(l_, g_, {Mat3::Identity(), {kNan, 0.0, 1.35}}));
 }
 
 TEST_F(SafetyChecks, TheWorkspaceItselfIsFreeOfTrips) {  // every coordinate alone, to its ends
@@ -187,8 +199,8 @@ TEST_F(SafetyChecks, TheWorkspaceItselfIsFreeOfTrips) {  // every coordinate alo
       const Pose x = Pose::from(share * (i < 3 ? 0.305 : 30 * kDegree) * Vec6::Unit(i));
       const Transform X = g_.fromHome(x);
       EXPECT_TRUE(actuatorLimitsCheck(l_, legLengths(g_, X))) << x.stacked().transpose();
-      EXPECT_TRUE(collideCheck(l_, g_, X)) << x.stacked().transpose();
-      EXPECT_TRUE(axes.check(l_, g_, X)) << x.stacked().transpose();
+      EXPECT_TRUE(clearAt(l_, g_, X)) << x.stacked().transpose();
+      EXPECT_TRUE(inCones(axes, l_, g_, X)) << x.stacked().transpose();
     }
 }
 
@@ -227,13 +239,13 @@ TEST(PathChecks, ConditionNumberIsTheFrobeniusOneOfTheJacobian) {
     const double expected = s.norm() * s.cwiseInverse().norm() / 6.0;
     ASSERT_NEAR(conditionNumber(g, X), expected, 1e-6 * expected);
     limits.condition = expected * 1.001;
-    EXPECT_TRUE(conditioningCheck(limits, g, X));
+    EXPECT_TRUE(conditionedAt(limits, g, X));
     limits.condition = expected * 0.999;
-    EXPECT_FALSE(conditioningCheck(limits, g, X));
+    EXPECT_FALSE(conditionedAt(limits, g, X));
   }
-  EXPECT_FALSE(conditioningCheck(limits, g, {Mat3::Identity(), {NAN, 0.0, 1.35}}));
+  EXPECT_FALSE(conditionedAt(limits, g, {Mat3::Identity(), {NAN, 0.0, 1.35}}));
   // Flat: the legs cannot hold it.
-  EXPECT_FALSE(conditioningCheck(limits, g, {Mat3::Identity(), {0.0, 0.0, 0.0}}));
+  EXPECT_FALSE(conditionedAt(limits, g, {Mat3::Identity(), {0.0, 0.0, 0.0}}));
 }
 
 TEST(PathChecks, NoLegLiesDownOnAPlate) {
@@ -247,9 +259,9 @@ TEST(PathChecks, NoLegLiesDownOnAPlate) {
     least = std::min(least, std::asin(leg.z() / leg.norm()));
   }
   limits.plate_angle = least - 1e-6;
-  EXPECT_TRUE(collideCheck(limits, g, home));
+  EXPECT_TRUE(clearAt(limits, g, home));
   limits.plate_angle = least + 1e-6;
-  EXPECT_FALSE(collideCheck(limits, g, home));
+  EXPECT_FALSE(clearAt(limits, g, home));
 }
 
 /// A tick in which all is well: the platform stands at home, its sample is true.

@@ -73,6 +73,10 @@ JointVector JointMomentum::at(const Sample& sample) const noexcept {
 
 void JointMomentum::update(const KnownPayload& known, const Sample& sample, const Mat3& R_IP,
                            const Mat3& R_EP, double since) noexcept {
+  if (!compensated_) {
+    q_ = sample.q;
+    return;
+  }
   if (known.changed() && known_ == 3 && aided_) relearn(known);
   if (!(since > 0.0)) return;
   if (known_ > 0 && sample.joints_time < last_[2].time) reset(sample.q);

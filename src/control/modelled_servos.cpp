@@ -10,7 +10,9 @@ ModelledServos::ModelledServos(const ServoModel& servo, double period, double ph
     : servo_(servo),
       period_(std::llround(period * 1e9)),
       to_update_(phase * servo.update),
-      whole_(passage(servo.update)) {}
+      whole_(passage(servo.update)) {
+  useDelays();
+}
 
 ModelledServos::Passage ModelledServos::passage(double dt) const noexcept {
   return {dt, (-dt / servo_.tau.array()).exp()};
@@ -44,11 +46,17 @@ void ModelledServos::use(const ServoGains& gains) noexcept {
   servo_.extend = gains.extend;
   servo_.retract = gains.retract;
   servo_.delay = gains.delay;
+  useDelays();
+}
+
+void ModelledServos::useDelays() noexcept {
+  for (std::size_t i = 0; i < kLegs; ++i)
+    delay_[i] = std::llround(servo_.delay(static_cast<Eigen::Index>(i)) * 1e9);
 }
 
 /// [m] of the newest command that has taken effect.
 double ModelledServos::reference(int leg) const noexcept {
-  const auto delay = std::llround(servo_.delay(leg) * 1e9);
+  const std::int64_t delay = delay_[static_cast<std::size_t>(leg)];
   const std::size_t known = std::min(sent_, kCommands);
   for (std::size_t i = 1; i < known; ++i) {
     const Command& command = commands_[(sent_ - i) % kCommands];
@@ -61,10 +69,8 @@ double ModelledServos::reference(int leg) const noexcept {
 void ModelledServos::update() noexcept {
   for (int i = 0; i < kLegs; ++i) E_(i) = reference(i);
   E_ -= reading(L_, v_) + servo_.derivative * v_;
-  for (int i = 0; i < kLegs; ++i) {
-    E_(i) = std::clamp(E_(i), -servo_.rail, servo_.rail);
-    v_end_(i) = speedOf(servo_, i, E_(i));
-  }
+  E_ = E_.cwiseMin(servo_.rail).cwiseMax(-servo_.rail);
+  v_end_ = speedsOf(servo_, E_);
 }
 
 /// Returns the mean acceleration.

@@ -57,27 +57,33 @@ double segmentDistance(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& 
   return (w + s * u - t * v).norm();
 }
 
-bool collideCheck(const SafetyLimits& limits, const Geometry& geometry,
-                  const Transform& X_IP) noexcept {
+bool collideCheck(const SafetyLimits& limits, const Geometry& geometry, const Transform& X_IP,
+                  const LegLines& lines) noexcept {
   std::array<Vec3, kLegs> p_IPi_I;
   for (std::size_t i = 0; i < kLegs; ++i) p_IPi_I[i] = X_IP * geometry.p_PPi_P[i];
   bool clear = true;
+  std::array<Vec3, kLegs> along;
   for (std::size_t i = 0; i < kLegs; ++i)
-    for (std::size_t j = i + 1; j < kLegs; ++j)
-      clear = clear && segmentDistance(geometry.p_IBi_I[i], p_IPi_I[i], geometry.p_IBi_I[j],
-                                       p_IPi_I[j]) >= limits.leg_clearance;
+    along[i] = lines.J.row(static_cast<Eigen::Index>(i)).head<3>();
+  const double nearest = limits.leg_clearance * limits.leg_clearance;
+  for (std::size_t i = 0; i < kLegs; ++i)
+    for (std::size_t j = i + 1; j < kLegs; ++j) {
+      // No segments come nearer than the lines that they lie on.
+      const Vec3 normal = along[i].cross(along[j]);
+      const double apart = normal.dot(geometry.p_IBi_I[i] - geometry.p_IBi_I[j]);
+      clear = clear && (apart * apart > nearest * normal.squaredNorm() ||
+                        segmentDistance(geometry.p_IBi_I[i], p_IPi_I[i], geometry.p_IBi_I[j],
+                                        p_IPi_I[j]) >= limits.leg_clearance);
+    }
   const double least = std::sin(limits.plate_angle);
   const Vec3 normal_I = X_IP.R.col(2);
-  for (std::size_t i = 0; i < kLegs; ++i) {
-    const Vec3 along = (p_IPi_I[i] - geometry.p_IBi_I[i]).normalized();
-    clear = clear && along.z() >= least && along.dot(normal_I) >= least;
-  }
+  for (const Vec3& leg : along) clear = clear && leg.z() >= least && leg.dot(normal_I) >= least;
   return clear;
 }
 
-bool conditioningCheck(const SafetyLimits& limits, const Geometry& geometry,
-                       const Transform& X_IP) noexcept {
-  return conditionNumber(geometry, X_IP) <= limits.condition;
+bool conditioningCheck(const SafetyLimits& limits, const LegLines& lines,
+                       double joint_radius) noexcept {
+  return conditionNumber(lines, joint_radius) <= limits.condition;
 }
 
 bool motionLimitsCheck(const SafetyLimits& limits, const Pose& x) noexcept {
@@ -109,14 +115,13 @@ JointAxes::JointAxes(const Geometry& geometry) noexcept {
   }
 }
 
-bool JointAxes::check(const SafetyLimits& limits, const Geometry& geometry,
-                      const Transform& X_IP) const noexcept {
+bool JointAxes::check(const SafetyLimits& limits, const Mat3& R_IP,
+                      const LegLines& lines) const noexcept {
   const double least = std::cos(limits.joint_cone);
   bool inside = true;
   for (std::size_t i = 0; i < kLegs; ++i) {
-    const Vec3 along = (X_IP * geometry.p_PPi_P[i] - geometry.p_IBi_I[i]).normalized();
-    inside =
-        inside && along.dot(base_I_[i]) >= least && along.dot(X_IP.R * platform_P_[i]) >= least;
+    const Vec3 along = lines.J.row(static_cast<Eigen::Index>(i)).head<3>();
+    inside = inside && along.dot(base_I_[i]) >= least && along.dot(R_IP * platform_P_[i]) >= least;
   }
   return inside;
 }

@@ -24,6 +24,12 @@ double speedOf(const ServoModel& servo, int i, double E) noexcept {
       std::min((servo.extend(i) + servo.retract(i)) * size, K * (size + ahead(servo, i, E))), E);
 }
 
+Vec6 speedsOf(const ServoModel& servo, const Vec6& E) noexcept {
+  Vec6 v_end;
+  for (int i = 0; i < kLegs; ++i) v_end(i) = speedOf(servo, i, E(i));
+  return v_end;
+}
+
 double differenceOf(const ServoModel& servo, int i, double v_end) noexcept {
   const double K = v_end > 0.0 ? servo.extend(i) : servo.retract(i);
   if (!(servo.opening(i) > 0.0)) return v_end / K;

@@ -13,7 +13,7 @@ struct Leg {
   Vec3 r;  // [m] Po to Pi
 };
 
-Leg leg(const Geometry& g, const Transform& X_IP, int i) {
+inline Leg leg(const Geometry& g, const Transform& X_IP, int i) {
   const auto k = static_cast<std::size_t>(i);
   const Vec3 r = X_IP.R * g.p_PPi_P[k];
   return {X_IP.p + r - g.p_IBi_I[k], r};
@@ -37,16 +37,10 @@ Mat6 halfJacobian(const Legs& legs) {
   return J;
 }
 
-/// False for a matrix that is singular to working precision, or not a number.
-bool regular(const Eigen::PartialPivLU<Mat6>& lu) {
-  const Vec6 pivots = lu.matrixLU().diagonal().cwiseAbs();
-  return pivots.minCoeff<Eigen::PropagateNaN>() > 1e-12 * pivots.maxCoeff<Eigen::PropagateNaN>();
-}
-
 /// Factorises; whether the matrix is regular.
 bool factorise(const Legs& legs, JacobianFactors& out) {
   out.lu.compute(halfJacobian(legs));
-  return out.known = regular(out.lu);
+  return out.known = out.lu.regular();
 }
 
 /// Newton-Raphson. The last factors do for another step where the step before has left no more than
@@ -160,10 +154,11 @@ ForwardSolution forwardPose(const Geometry& geometry, const Vec6& L, const Trans
 }
 
 bool platformMotions(const Geometry& geometry, const Transform& X_IP, Motions& motions) noexcept {
+  const Legs at = legs(geometry, X_IP);
   JacobianFactors here;
-  if (!factorise(legs(geometry, X_IP), here)) return false;
-  const Motions rhs = legLengths(geometry, X_IP).asDiagonal() * motions;
-  motions = here.lu.solve(rhs);
+  if (!factorise(at, here)) return false;
+  for (int i = 0; i < kLegs; ++i) motions.row(i) *= at[static_cast<std::size_t>(i)].d.norm();
+  motions = here.lu.solve(motions);
   return true;
 }
 
@@ -175,12 +170,16 @@ double jointRadius(const Geometry& geometry) noexcept {
   return std::sqrt(sum / kLegs);
 }
 
-double conditionNumber(const Geometry& geometry, const Transform& X_IP) noexcept {
-  Mat6 J = legLines(geometry, X_IP).J;
-  J.rightCols<3>() /= jointRadius(geometry);
-  const Eigen::PartialPivLU<Mat6> lu(J);
-  if (!regular(lu)) return HUGE_VAL;
+double conditionNumber(const LegLines& lines, double joint_radius) noexcept {
+  Mat6 J = lines.J;
+  J.rightCols<3>() /= joint_radius;
+  const Lu6 lu(J);
+  if (!lu.regular()) return HUGE_VAL;
   return J.norm() * lu.inverse().norm() / 6.0;
+}
+
+double conditionNumber(const Geometry& geometry, const Transform& X_IP) noexcept {
+  return conditionNumber(legLines(geometry, X_IP), jointRadius(geometry));
 }
 
 bool forwardMotion(const Geometry& geometry, const Transform& X_IP, const LegMotion& legs,

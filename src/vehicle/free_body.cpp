@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "ves/math/dense.hpp"
+#include "ves/math/lu6.hpp"
 #include "ves/math/relative_motion.hpp"
 
 namespace ves {
@@ -137,7 +137,7 @@ void FreeBody::step(const Wrench& F_Po_I, const CarriedBody& carried, double dt,
              before = own + rotated(carried.R_IP_before.transpose(), carried.before),
              after = own + rotated(carried.R_IP.transpose(), carried.M_1),
              middle = rotated(from.R_IP, 0.5 * (before + after));
-  mobility_ = middle.inverse();
+  mobility_ = Lu6(middle).inverse();
   damping_ = -damping * (middle * (velocity(from) - along_));
   Wrench F = Wrench::from(F_Po_I.stacked() + damping_), F_ahead = F;
   const Propulsion& jets = model_.propulsion;

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/vehicle/modal_vehicle.hpp"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cassert>
 #include <cmath>
 
 #include "ves/kinematics/stewart.hpp"
 #include "ves/math/dense.hpp"
+#include "ves/math/lu6.hpp"
 #include "ves/math/second_order.hpp"
 
 namespace ves {
@@ -143,7 +143,7 @@ ModalDynamics ModalDynamics::scaled(const VehicleFactors& f) const noexcept {
 /// Woodbury: (1 + Phi^T M_1 Phi)^-1 = 1 - Phi^T (1 + M_1 Phi Phi^T)^-1 M_1 Phi.
 ModalDynamics::Body ModalDynamics::body(const Mat6& M_1) const noexcept {
   const Mat6 left = Mat6::Identity() + M_1.lazyProduct(compliance_);
-  const Mat6 inverse = left.inverse(), X = inverse.lazyProduct(M_1);
+  const Mat6 inverse = Lu6(left).inverse(), X = inverse.lazyProduct(M_1);
   Body out;
   out.pull = X.lazyProduct(Phi_);
   out.mobility = compliance_.lazyProduct(inverse);

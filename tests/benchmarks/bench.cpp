@@ -15,6 +15,7 @@
 #include "support/poses.hpp"
 #include "support/rig.hpp"
 #include "support/robots.hpp"
+#include "support/under_way.hpp"
 #include "ves/bus/channels.hpp"
 #include "ves/bus/key.hpp"
 #include "ves/control/gravity_compensation.hpp"
@@ -26,6 +27,7 @@ namespace ves {
 namespace {
 
 using test::experiment;
+using test::UnderWay;
 
 // Kinematics
 
@@ -181,26 +183,11 @@ BENCHMARK(SafetyChecks);
 
 // Whole
 
-/// A controller in the middle of its admittance segment, and the machine as it is then.
-struct UnderWay {
-  Experiment e;
-  TestPlatform platform{e.controller};
-  plant::Plant plant{e.plant};
-  TickInput in, used;
-
-  explicit UnderWay(const std::vector<std::string>& set = {})  // PUMA, six modes
-      : e(experiment("puma_on_table_4_1", set)) {
-    in.order.request = Request::kStart;
-    while (in.tick < 700) step();
-  }
-  void step() {
-    in.sample = plant.sample();
-    in.time = plant.time();
-    used = in;
-    plant.command(platform.tick(in).command);
-    plant.advance(++in.tick * e.controller.period);
-  }
-};
+const std::vector<std::string>& caseOf(const std::string& name) {
+  for (const test::TickCase& one : test::tickCases())
+    if (one.name == name) return one.set;
+  throw std::logic_error(name);
+}
 
 /// Inputs of a closed loop, again and again from the same state.
 void tick(benchmark::State& state, const std::vector<std::string>& set) {
@@ -217,22 +204,13 @@ void tick(benchmark::State& state, const std::vector<std::string>& set) {
   }
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(inputs.size()));
 }
-void ControllerTick(benchmark::State& state) { tick(state, {}); }
-const std::vector<std::string> kCompensated = {
-    "controller.compensation.feed_forward=true", "controller.compensation.observer=true",
-    "controller.compensation.inertia=true", "sensor.readings_per_tick=4"};
-void ControllerTickCompensated(benchmark::State& state) { tick(state, kCompensated); }
+void ControllerTick(benchmark::State& state) { tick(state, caseOf("published")); }
+void ControllerTickCompensated(benchmark::State& state) { tick(state, caseOf("compensated")); }
 void ControllerTickLearningAided(benchmark::State& state) {
-  std::vector<std::string> set = kCompensated;
-  set.insert(set.end(),
-             {"controller.compensation.adaptation=true", "controller.compensation.wrench=aided"});
-  tick(state, set);
+  tick(state, caseOf("adaptation_aided"));
 }
 void ControllerTickLearningMasses(benchmark::State& state) {
-  std::vector<std::string> set = kCompensated;
-  set.insert(set.end(), {"controller.compensation.wrench=aided",
-                         "controller.compensation.learns_masses=true"});
-  tick(state, set);
+  tick(state, caseOf("learning_masses"));
 }
 BENCHMARK(ControllerTick);
 BENCHMARK(ControllerTickCompensated);
@@ -264,7 +242,7 @@ void tail(benchmark::State& state, const std::vector<std::string>& set) {
   state.counters["p999_over_median"] = at(0.999) / at(0.5);
 }
 void ControllerTickTail(benchmark::State& state) { tail(state, {}); }
-void ControllerTickTailCompensated(benchmark::State& state) { tail(state, kCompensated); }
+void ControllerTickTailCompensated(benchmark::State& state) { tail(state, caseOf("compensated")); }
 BENCHMARK(ControllerTickTail)->Iterations(20)->Unit(benchmark::kMillisecond);
 BENCHMARK(ControllerTickTailCompensated)->Iterations(20)->Unit(benchmark::kMillisecond);
 

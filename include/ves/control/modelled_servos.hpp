@@ -69,6 +69,7 @@ class ModelledServos {
     std::int64_t tick = -1, time = 0;  // [-], [ns] when it came
     Vec6 reference = Vec6::Zero();     // [m]
   };
+  void useDelays() noexcept;
   double reference(int leg) const noexcept;
   Channels pass(const Passage& passage) noexcept;
   void update() noexcept;
@@ -76,7 +77,8 @@ class ModelledServos {
   static constexpr std::size_t kCommands = kMostDelay + 4;
 
   ServoModel servo_;
-  std::int64_t period_;   // [ns] of the controller
+  std::array<std::int64_t, kLegs> delay_;  // [ns] of it
+  std::int64_t period_;                    // [ns] of the controller
   double to_update_;      // [s]
   Passage whole_;         // of an update
   std::int64_t now_ = 0;  // [ns]

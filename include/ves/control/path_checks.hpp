@@ -11,16 +11,20 @@ namespace ves {
 class PathChecks {
  public:
   PathChecks(const SafetyLimits& limits, const Geometry& geometry)
-      : limits_(limits), geometry_(geometry), joint_axes_(geometry) {}
+      : limits_(limits),
+        geometry_(geometry),
+        joint_axes_(geometry),
+        joint_radius_(jointRadius(geometry)) {}
 
   /// Of the pose X_IP, which is x about home and takes the lengths L.
   Tripped pose(const Transform& X_IP, const Pose& x, const Vec6& L) const noexcept {
+    const LegLines lines = legLines(geometry_, X_IP);
     Tripped t;
     t.require(Check::kMotionLimits, motionLimitsCheck(limits_, x));
     t.require(Check::kActuatorLimits, actuatorLimitsCheck(limits_, L));
-    t.require(Check::kJointLimits, joint_axes_.check(limits_, geometry_, X_IP));
-    t.require(Check::kCollide, collideCheck(limits_, geometry_, X_IP));
-    t.require(Check::kConditioning, conditioningCheck(limits_, geometry_, X_IP));
+    t.require(Check::kJointLimits, joint_axes_.check(limits_, X_IP.R, lines));
+    t.require(Check::kCollide, collideCheck(limits_, geometry_, X_IP, lines));
+    t.require(Check::kConditioning, conditioningCheck(limits_, lines, joint_radius_));
     return t;
   }
 
@@ -39,6 +43,7 @@ class PathChecks {
   SafetyLimits limits_;
   Geometry geometry_;
   JointAxes joint_axes_;
+  double joint_radius_;  // [m]
 };
 
 }  // namespace ves

@@ -33,8 +33,9 @@ bool pressureCheck(const SafetyLimits&, const AdcCounts& adc) noexcept;
 /// No wrench channel reads an end of the 16-bit converter.
 bool saturationCheck(const AdcCounts& adc) noexcept;
 
-/// No two legs come closer than leg_clearance, and no leg lies down on a plate.
-bool collideCheck(const SafetyLimits&, const Geometry&, const Transform& X_IP) noexcept;
+/// No two legs come closer than leg_clearance, and no leg lies down on a plate; `lines` at X_IP.
+bool collideCheck(const SafetyLimits&, const Geometry&, const Transform& X_IP,
+                  const LegLines& lines) noexcept;
 
 /// Every coordinate is inside the workspace.
 bool motionLimitsCheck(const SafetyLimits&, const Pose& x) noexcept;
@@ -46,8 +47,9 @@ bool actuatorLimitsCheck(const SafetyLimits&, const Vec6& L) noexcept;
 bool flowLimitsCheck(const SafetyLimits&, const Vec6& L, const Vec6& L_last,
                      double period) noexcept;
 
-/// The condition number of the Jacobian is small: far from singular poses.
-bool conditioningCheck(const SafetyLimits&, const Geometry&, const Transform& X_IP) noexcept;
+/// The condition number of the Jacobian is small: far from singular poses. joint_radius: [m]
+/// jointRadius().
+bool conditioningCheck(const SafetyLimits&, const LegLines& lines, double joint_radius) noexcept;
 
 /// Axes of the ball joints: along the legs at home.
 class JointAxes {
@@ -55,7 +57,7 @@ class JointAxes {
   explicit JointAxes(const Geometry& geometry) noexcept;
 
   /// Every leg is inside the cones of its base and platform joints.
-  bool check(const SafetyLimits&, const Geometry&, const Transform& X_IP) const noexcept;
+  bool check(const SafetyLimits&, const Mat3& R_IP, const LegLines& lines) const noexcept;
 
  private:
   std::array<Vec3, kLegs> base_I_{};      // [-] unit vectors

@@ -44,6 +44,7 @@ struct ServoModel {
 
 /// [m/s] v_end of leg i for E [m], and E for v_end: the same curve, which rises all the way.
 double speedOf(const ServoModel& servo, int i, double E) noexcept;
+Vec6 speedsOf(const ServoModel& servo, const Vec6& E) noexcept;
 double differenceOf(const ServoModel& servo, int i, double v_end) noexcept;
 /// [1/s] of each leg where v_end rises most with E, in either direction.
 Vec6 steepest(const ServoModel& servo) noexcept;

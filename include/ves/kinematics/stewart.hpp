@@ -4,10 +4,10 @@
 // kinematics of position (2.23), rate (2.24) and acceleration (2.32).
 #pragma once
 
-#include <Eigen/LU>
 #include <array>
 
 #include "ves/math/frames.hpp"
+#include "ves/math/lu6.hpp"
 #include "ves/math/quintic.hpp"
 
 namespace ves {
@@ -86,7 +86,7 @@ ForwardSolution forwardPose(const Geometry& geometry, const Vec6& L,
 /// The Jacobian of one pose, factorised. Consecutive poses are close, so that the factors of the
 /// last pose serve for the next.
 struct JacobianFactors {
-  Eigen::PartialPivLU<Mat6> lu;  // of half the derivative of (2.22) with respect to the twist
+  Lu6 lu;  // of half the derivative of (2.22) with respect to the twist
   bool known = false;
 };
 
@@ -108,6 +108,7 @@ double jointRadius(const Geometry& geometry) noexcept;
 /// |J| |J^-1| / 6 in the Frobenius norm, of the Jacobian from twists to leg rates with lengths
 /// counted in jointRadius(), the same for platforms of one shape: 1 at best, infinite where the
 /// legs cannot hold it.
+double conditionNumber(const LegLines& lines, double joint_radius) noexcept;
 double conditionNumber(const Geometry& geometry, const Transform& X_IP) noexcept;
 
 /// Rate (2.24) and acceleration (2.32) of P at the pose X_IP. Where (2.30) to (2.32) print only the

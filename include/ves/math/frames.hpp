@@ -74,7 +74,7 @@ struct Wrench {
   Vec3 f = Vec3::Zero();  // [N]
   Vec3 n = Vec3::Zero();  // [N m]
 
-  Vec6 stacked() const { return (Vec6() << f, n).finished(); }
+  Vec6 stacked() const { return Vec6{{f.x(), f.y(), f.z(), n.x(), n.y(), n.z()}}; }
   static Wrench from(const Vec6& w) { return {w.head<3>(), w.tail<3>()}; }
 };
 
