@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/acceptance/measures.hpp"
 
-#include <gsl/gsl_cdf.h>
-
 #include <algorithm>
+#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 
 #include "ves/math/dense.hpp"
@@ -15,7 +14,7 @@ constexpr double kNormal = 1.96;  // [-] 95 % of a normal distribution
 constexpr int kHarmonics = 3;
 
 double student(std::size_t values) {
-  return gsl_cdf_tdist_Pinv(0.975, static_cast<double>(values - 1));
+  return quantile(boost::math::students_t(static_cast<double>(values - 1)), 0.975);
 }
 
 double mean(const std::vector<double>& values) {

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/analysis/appendix_e.hpp"
 
-#include <gsl/gsl_poly.h>
-
 #include <cmath>
 
 #include "ves/math/dense.hpp"
@@ -17,10 +15,10 @@ std::array<std::complex<double>, 3> roots(const SampledOscillator& o) {
   const double c = std::cos(d * omega_tau), s = zeta / d * std::sin(d * omega_tau);
   const double a = e * (r * s - (2.0 + r) * c);
   const double b = e * e * (r + 1.0) + e * (r * c - r * s);
-  gsl_complex z[3];
-  gsl_poly_complex_solve_cubic(a, b, -r * e * e, &z[0], &z[1], &z[2]);
-  std::array<std::complex<double>, 3> out;
-  for (std::size_t i = 0; i < 3; ++i) out[i] = {GSL_REAL(z[i]), GSL_IMAG(z[i])};
+  Mat3 companion;
+  companion << -a, -b, r * e * e, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0;
+  const Eigen::VectorXcd z = eigenvalues(companion);
+  std::array<std::complex<double>, 3> out = {z(0), z(1), z(2)};
   // The third root is the one that is r when the sampling is infinitely fast.
   std::size_t third = 0;
   for (std::size_t i = 1; i < 3; ++i)

@@ -2,12 +2,10 @@
 //
 // base.ground: what a vehicle stands on, recorded or as waves make a ship move.
 #include <fmt/format.h>
-#include <gsl/gsl_spline.h>
 
 #include <algorithm>
 #include <charconv>
 #include <complex>
-#include <memory>
 #include <random>
 #include <sstream>
 
@@ -127,28 +125,44 @@ Recording readRecording(const std::string& text, const std::string& file) {
   return out;
 }
 
+/// Second derivatives at the knots of the natural cubic spline: a tridiagonal system, eliminated
+/// downwards.
+std::vector<double> curvatures(const std::vector<double>& t, const std::vector<double>& x) {
+  const std::size_t n = t.size();
+  std::vector<double> curve(n, 0.0), above(n, 0.0);
+  for (std::size_t k = 1; k + 1 < n; ++k) {
+    const double before = t[k] - t[k - 1], after = t[k + 1] - t[k];
+    const double slopes = (x[k + 1] - x[k]) / after - (x[k] - x[k - 1]) / before;
+    const double pivot = 2.0 * (before + after) - before * above[k - 1];
+    above[k] = after / pivot;
+    curve[k] = (6.0 * slopes - before * curve[k - 1]) / pivot;
+  }
+  for (std::size_t k = n - 1; k-- > 1;) curve[k] -= above[k] * curve[k + 1];
+  return curve;
+}
+
 /// Natural cubic splines through the rows.
 GroundMotion resampled(const Recording& recording) {
-  struct Free {
-    void operator()(gsl_spline* s) const { gsl_spline_free(s); }
-    void operator()(gsl_interp_accel* a) const { gsl_interp_accel_free(a); }
-  };
-  const double begin = recording.t.front(), lasts = recording.t.back() - begin;
+  const std::vector<double>& knots = recording.t;
+  const double begin = knots.front(), lasts = knots.back() - begin;
   const auto n = static_cast<Eigen::Index>(std::floor(lasts / kStep)) + 1;
   GroundMotion out;
   out.step = kStep;
   out.rows.setZero(18, n);
   for (std::size_t c = 0; c < 6; ++c) {
-    const std::unique_ptr<gsl_spline, Free> spline(
-        gsl_spline_alloc(gsl_interp_cspline, recording.t.size()));
-    const std::unique_ptr<gsl_interp_accel, Free> place(gsl_interp_accel_alloc());
-    gsl_spline_init(spline.get(), recording.t.data(), recording.x[c].data(), recording.t.size());
+    const std::vector<double>& x = recording.x[c];
+    const std::vector<double> curve = curvatures(knots, x);
     const auto row = static_cast<Eigen::Index>(c);
+    std::size_t k = 1;  // the knot after
     for (Eigen::Index i = 0; i < n; ++i) {
-      const double t = std::min(begin + kStep * static_cast<double>(i), recording.t.back());
-      out.rows(row, i) = gsl_spline_eval(spline.get(), t, place.get());
-      out.rows(6 + row, i) = gsl_spline_eval_deriv(spline.get(), t, place.get());
-      out.rows(12 + row, i) = gsl_spline_eval_deriv2(spline.get(), t, place.get());
+      const double t = std::min(begin + kStep * static_cast<double>(i), knots.back());
+      while (k + 1 < knots.size() && knots[k] < t) ++k;
+      const double h = knots[k] - knots[k - 1], from = t - knots[k - 1], to = knots[k] - t,
+                   c_0 = curve[k - 1] / (6.0 * h), c_1 = curve[k] / (6.0 * h),
+                   x_0 = x[k - 1] / h - c_0 * h * h, x_1 = x[k] / h - c_1 * h * h;
+      out.rows(row, i) = x_0 * to + x_1 * from + c_0 * to * to * to + c_1 * from * from * from;
+      out.rows(6 + row, i) = x_1 - x_0 - 3.0 * c_0 * to * to + 3.0 * c_1 * from * from;
+      out.rows(12 + row, i) = 6.0 * (c_0 * to + c_1 * from);
     }
   }
   return out;

@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/evaluation/indicators.hpp"
 
-#include <gsl/gsl_fft_halfcomplex.h>
-#include <gsl/gsl_fft_real.h>
-
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <memory>
 #include <numeric>
+#include <unsupported/Eigen/FFT>
 
 namespace ves {
 namespace {
@@ -45,25 +42,13 @@ std::size_t fastLength(std::size_t n) {
   return n;
 }
 
-struct FreeTable {
-  void operator()(gsl_fft_real_wavetable* t) const { gsl_fft_real_wavetable_free(t); }
-};
-struct FreeWorkspace {
-  void operator()(gsl_fft_real_workspace* w) const { gsl_fft_real_workspace_free(w); }
-};
-
 /// The first `size` points' discrete Fourier transform, the frequencies 0 to half of them.
 std::vector<std::complex<double>> spectrum(std::vector<double> x, std::size_t size) {
-  const std::unique_ptr<gsl_fft_real_wavetable, FreeTable> table(
-      gsl_fft_real_wavetable_alloc(size));
-  const std::unique_ptr<gsl_fft_real_workspace, FreeWorkspace> work(
-      gsl_fft_real_workspace_alloc(size));
-  gsl_fft_real_transform(x.data(), 1, size, table.get(), work.get());
-  std::vector<double> unpacked(2 * size);
-  gsl_fft_halfcomplex_unpack(x.data(), unpacked.data(), 1, size);
+  x.resize(size);
+  Eigen::FFT<double> fft;
+  fft.SetFlag(Eigen::FFT<double>::HalfSpectrum);
   std::vector<std::complex<double>> out;
-  for (std::size_t k = 0; k <= size / 2; ++k)
-    out.emplace_back(unpacked[2 * k], unpacked[2 * k + 1]);
+  fft.fwd(out, x);
   return out;
 }
 

@@ -2,7 +2,6 @@
 #include "ves/evaluation/summary.hpp"
 
 #include <fmt/format.h>
-#include <gsl/gsl_statistics_double.h>
 
 #include <algorithm>
 #include <cmath>
@@ -155,12 +154,12 @@ void addDrift(const Series& series, nlohmann::ordered_json& out) {
   if (all.size() < 3) return;
   out["drift_samples"] = all.size();
   const auto correlation = [&](int i) {
-    std::vector<double> wrench, temperature;
-    for (const DriftSample& one : all) {
-      wrench.push_back(one.wrench(i));
-      temperature.push_back(one.temperature);
-    }
-    return gsl_stats_correlation(wrench.data(), 1, temperature.data(), 1, all.size());
+    Eigen::ArrayX2d both(all.size(), 2);
+    for (std::size_t n = 0; n < all.size(); ++n)
+      both.row(static_cast<Eigen::Index>(n)) << all[n].wrench(i), all[n].temperature;
+    both.rowwise() -= both.colwise().mean().eval();
+    const Eigen::VectorXd wrench = both.col(0), temperature = both.col(1);
+    return wrench.dot(temperature) / (wrench.norm() * temperature.norm());
   };
   const auto residual = [&](int i, double hours) {
     double most = 0.0;

@@ -2,11 +2,9 @@
 #include "ves/identification/mass_parameters.hpp"
 
 #include <fmt/format.h>
-#include <gsl/gsl_linalg.h>
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <random>
 #include <stdexcept>
 
@@ -18,35 +16,6 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-struct FreeMatrix {
-  void operator()(gsl_matrix* m) const { gsl_matrix_free(m); }
-};
-struct FreeVector {
-  void operator()(gsl_vector* v) const { gsl_vector_free(v); }
-};
-
-/// A = U diag(s) V^T, rows >= columns, s falling.
-struct Svd {
-  MatrixXd U, V;
-  VectorXd s;
-};
-
-Svd svd(const MatrixXd& A) {
-  const auto rows = static_cast<std::size_t>(A.rows()), cols = static_cast<std::size_t>(A.cols());
-  const std::unique_ptr<gsl_matrix, FreeMatrix> U(gsl_matrix_alloc(rows, cols)),
-      V(gsl_matrix_alloc(cols, cols));
-  const std::unique_ptr<gsl_vector, FreeVector> s(gsl_vector_alloc(cols)),
-      work(gsl_vector_alloc(cols));
-  using RowMajor = Eigen::Matrix<double, -1, -1, Eigen::RowMajor>;
-  Eigen::Map<RowMajor, 0, Eigen::OuterStride<>> u(U->data, A.rows(), A.cols(),
-                                                  Eigen::OuterStride<>(static_cast<Index>(U->tda)));
-  u = A;
-  gsl_linalg_SV_decomp(U.get(), V.get(), s.get(), work.get());
-  const Eigen::Map<RowMajor, 0, Eigen::OuterStride<>> v(
-      V->data, A.cols(), A.cols(), Eigen::OuterStride<>(static_cast<Index>(V->tda)));
-  return {u, v, VectorXd::Map(s->data, A.cols())};
-}
 
 /// Columns at length one; those that are zero stay so.
 VectorXd normalise(MatrixXd& A) {

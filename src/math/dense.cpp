@@ -5,6 +5,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <Eigen/QR>
+#include <Eigen/SVD>
 #include <unsupported/Eigen/MatrixFunctions>
 
 namespace ves {
@@ -35,6 +36,17 @@ SymmetricEigen symmetricEigen(const MatrixXd& A) {
   if (A.size() == 0) return {};
   const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(A);
   return {solver.eigenvalues(), solver.eigenvectors()};
+}
+
+SymmetricEigen symmetricEigen(const MatrixXd& A, const MatrixXd& B) {
+  if (A.size() == 0 || B.llt().info() != Eigen::Success) return {};
+  const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> solver(A, B);
+  return {solver.eigenvalues(), solver.eigenvectors()};
+}
+
+Svd svd(const MatrixXd& A) {
+  const Eigen::JacobiSVD<MatrixXd> of(A, Eigen::ComputeThinU | Eigen::ComputeThinV);
+  return {of.matrixU(), of.matrixV(), of.singularValues()};
 }
 
 MatrixXd exponential(const MatrixXd& A) { return A.exp(); }

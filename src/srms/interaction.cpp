@@ -1,24 +1,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/srms/interaction.hpp"
 
-#include <gsl/gsl_odeiv2.h>
-
 #include <algorithm>
-#include <memory>
+#include <boost/numeric/odeint/stepper/controlled_runge_kutta.hpp>
+#include <boost/numeric/odeint/stepper/runge_kutta_fehlberg78.hpp>
 #include <stdexcept>
+#include <vector>
 
-#include "gsl_errors.hpp"
 #include "vehicle_equations.hpp"
 
 namespace ves {
 namespace {
 
+namespace odeint = boost::numeric::odeint;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-struct FreeDriver {
-  void operator()(gsl_odeiv2_driver* d) const { gsl_odeiv2_driver_free(d); }
-};
 
 /// The equations of motion, y = {the vehicle's, and where there is a world {p, q, v, w} of what
 /// floats in it}.
@@ -178,49 +174,100 @@ class Equations {
   std::optional<BegunPush> push_;
 };
 
+/// Runge, Kutta and Fehlberg's steps of eighth order, as long as the tolerance lets them be.
+class Solver {
+ public:
+  Solver(const Equations& equations, const InteractionOptions& options)
+      : rates_{&equations},
+        controlled_(Checker(options.tolerance * equations.milli(), options.tolerance, 1.0, 0.0)) {}
+
+  /// [s] of the next step, at most.
+  void startWith(double length) { length_ = length; }
+
+  /// A step on from `now`, to `until` at most; returns where it ends.
+  double step(double now, double until, VectorXd& y) {
+    for (;;) {
+      const bool last = now + length_ >= until;
+      double then = now, length = last ? until - now : length_;
+      State state = stateOf(y);
+      const bool taken = controlled_.try_step(rates_, state, then, length) ==
+                         odeint::controlled_step_result::success;
+      // What is left of an interval says nothing of how long the next step may be.
+      length_ = taken && last ? std::max(length_, length) : length;
+      if (!taken && now + length_ > now) continue;
+      if (!taken) throw Diverges();
+      y = VectorXd::Map(state.data(), y.size());
+      return last ? until : then;
+    }
+  }
+
+  /// One of that length, however large its error.
+  void leap(double now, double length, VectorXd& y) {
+    State state = stateOf(y);
+    Stepper().do_step(rates_, state, now, length);
+    y = VectorXd::Map(state.data(), y.size());
+  }
+
+  struct Diverges {};
+
+ private:
+  using State = std::vector<double>;
+  using Stepper = odeint::runge_kutta_fehlberg78<State>;
+  using Checker =
+      odeint::default_error_checker<double, odeint::range_algebra, odeint::default_operations>;
+  struct Rates {
+    const Equations* equations;
+    void operator()(const State& y, State& y_dot, double t) const {
+      const auto n = static_cast<Eigen::Index>(y.size());
+      VectorXd rates(n);
+      equations->derivative(t, VectorXd::Map(y.data(), n), rates);
+      if (!rates.allFinite()) throw Diverges();
+      VectorXd::Map(y_dot.data(), n) = rates;
+    }
+  };
+
+  static State stateOf(const VectorXd& y) { return {y.begin(), y.end()}; }
+
+  Rates rates_;
+  odeint::controlled_runge_kutta<Stepper, Checker> controlled_;
+  double length_ = 1e-3;  // [s]
+};
+
 /// The interval of `over` [s], step by step: every one is seen, and ends where the tool begins or
 /// ceases to touch.
-int passContacts(gsl_odeiv2_driver& driver, Equations& equations, double over, VectorXd& y) {
+void passContacts(Solver& solver, Equations& equations, double over, VectorXd& y) {
   constexpr double kSame = 1e-12;      // [s]
   constexpr double kInContact = 1e-3;  // [s], or
   constexpr double kShare = 0.05;  // [-] of its duration so far: a peak is seen to 1 part in 1000
-  double now = 0.0, h = std::min(over, kInContact);
+  double now = 0.0;
+  solver.startWith(std::min(over, kInContact));
   bool touches = equations.touched(now, y).least < 0.0;
   equations.see(now, y);
   while (now < over) {
     const double before = now;
     const VectorXd from = y;
     const double most = std::max(kInContact, kShare * equations.contact().duration);
-    const double until = touches ? std::min(over, now + most) : over;
-    const int status = gsl_odeiv2_evolve_apply(driver.e, driver.c, driver.s, driver.sys, &now,
-                                               until, &h, y.data());
-    if (status != GSL_SUCCESS) return status;
-    if (!(now > before)) return GSL_FAILURE;
+    now = solver.step(now, touches ? std::min(over, now + most) : over, y);
     if ((equations.touched(now, y).least < 0.0) != touches) {
       // One step of just that length, by halves.
-      VectorXd error(y.size());
       double low = 0.0, high = now - before;
-      const auto step = [&](double length) {
+      const auto leap = [&](double length) {
         y = from;
-        gsl_odeiv2_step_reset(driver.s);
-        return gsl_odeiv2_step_apply(driver.s, before, length, y.data(), error.data(), nullptr,
-                                     nullptr, driver.sys);
+        solver.leap(before, length, y);
       };
       while (high - low > kSame) {
         const double middle = 0.5 * (low + high);
         if (!(middle > low && middle < high)) break;
-        if (const int failed = step(middle); failed != GSL_SUCCESS) return failed;
+        leap(middle);
         ((equations.touched(before + middle, y).least < 0.0) == touches ? low : high) = middle;
       }
-      if (const int failed = step(high); failed != GSL_SUCCESS) return failed;
+      leap(high);
       now = before + high;
       touches = !touches;
-      h = std::min(kInContact, over);
-      gsl_odeiv2_evolve_reset(driver.e);
+      solver.startWith(std::min(kInContact, over));
     }
     equations.see(now, y);
   }
-  return GSL_SUCCESS;
 }
 
 }  // namespace
@@ -239,23 +286,7 @@ std::vector<InteractionPoint> simulate(const Interaction& interaction,
   Equations equations(interaction, options);
   VectorXd y = equations.start();
 
-  gsl_odeiv2_system system;
-  system.function = [](double later, const double state[], double rates[], void* self) -> int {
-    const auto& e = *static_cast<const Equations*>(self);
-    const auto n = static_cast<Eigen::Index>(e.size());
-    VectorXd derivative(n);
-    e.derivative(later, VectorXd::Map(state, n), derivative);
-    VectorXd::Map(rates, n) = derivative;
-    return derivative.allFinite() ? GSL_SUCCESS : GSL_EBADFUNC;
-  };
-  system.jacobian = nullptr;
-  system.dimension = equations.size();
-  system.params = &equations;
-  const std::unique_ptr<gsl_odeiv2_driver, FreeDriver> driver(
-      gsl_odeiv2_driver_alloc_y_new(&system, gsl_odeiv2_step_rk8pd, 1e-3,
-                                    options.tolerance * equations.milli(), options.tolerance));
-
-  returnGslErrors();
+  Solver solver(equations, options);
   std::vector<InteractionPoint> out;
   auto next = interaction.actions.begin();
   std::int64_t now = 0;
@@ -269,16 +300,17 @@ std::vector<InteractionPoint> simulate(const Interaction& interaction,
       std::int64_t until = end;
       if (next != interaction.actions.end()) until = std::min(until, next->start);
       until = equations.pushEnds(until);
-      double later = 0.0;
-      gsl_odeiv2_driver_reset(driver.get());
       const double over = static_cast<double>(until - now) * kSecondPerNanosecond;
-      const int status = equations.hasWorld()
-                             ? passContacts(*driver, equations, over, y)
-                             : gsl_odeiv2_driver_apply(driver.get(), &later, over, y.data());
-      if (status != GSL_SUCCESS)
+      try {
+        if (equations.hasWorld())
+          passContacts(solver, equations, over, y);
+        else
+          for (double later = 0.0; later < over;) later = solver.step(later, over, y);
+      } catch (const Solver::Diverges&) {
         throw std::domain_error(
             "the tolerance cannot be kept: the motion grows without bound, or "
             "too small a tolerance is asked");
+      }
       now = until;
     }
   }

@@ -2,10 +2,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <gsl/gsl_qrng.h>
-
+#include <boost/random/sobol.hpp>
 #include <cmath>
-#include <memory>
 #include <utility>
 
 #include "number.hpp"
@@ -29,7 +27,7 @@ double uniform(std::uint64_t seed, std::uint64_t run, std::uint64_t key) {
   return static_cast<double>(mixed(seed, run, key) >> 11) * 0x1p-53;
 }
 
-constexpr std::uint32_t kPointBits = 30;  // [-] of GSL's Sobol points
+constexpr std::uint32_t kPointBits = 30;  // [-] of a Sobol point
 
 /// Where i goes among n, each somewhere else: a Feistel network over the next power of four, gone
 /// through until it is one of them.
@@ -133,7 +131,7 @@ std::string SweepPlan::text() const {
 }
 
 void SweepPlan::lay(SweepDesign design) {
-  constexpr std::size_t kMostKeys = 40, kMostNumbers = 100'000'000;  // GSL's; 400 MB
+  constexpr std::size_t kMostKeys = 40, kMostNumbers = 100'000'000;  // 400 MB
   design_ = design;
   if (design != SweepDesign::kUniform && (drawn_.empty() || draws_ == 1))
     throw InputError("--design: places draws, want --draw, and --runs of more than one");
@@ -144,16 +142,11 @@ void SweepPlan::lay(SweepDesign design) {
         fmt::format("--design sobol: {} keys and {} runs, want at most {} keys, and {} "
                     "runs times keys",
                     keys, runs, kMostKeys, kMostNumbers));
-  points_.assign(keys, 0);  // the first, which GSL leaves out
+  points_.assign(keys, 0);  // the first, which Boost leaves out
   points_.reserve(runs * keys);
-  const std::unique_ptr<gsl_qrng, void (*)(gsl_qrng*)> sobol(
-      gsl_qrng_alloc(gsl_qrng_sobol, static_cast<unsigned>(keys)), gsl_qrng_free);
-  std::vector<double> point(keys);
-  while (points_.size() < runs * keys) {
-    gsl_qrng_get(sobol.get(), point.data());
-    for (const double x : point)
-      points_.push_back(static_cast<std::uint32_t>(std::ldexp(x, kPointBits)));
-  }
+  boost::random::sobol sobol(keys);
+  while (points_.size() < runs * keys)
+    points_.push_back(static_cast<std::uint32_t>(sobol() >> (64 - kPointBits)));
 }
 
 /// Of one combination's draws each key has its own order or digits.

@@ -86,7 +86,7 @@ if(result EQUAL 0 OR NOT out MATCHES "warp")
 endif()
 file(WRITE ${WORK}/alone/CMakeLists.txt "cmake_minimum_required(VERSION 3.25)\nproject(alone CXX)\n"
   "find_package(ves 0.1 REQUIRED COMPONENTS contract control)\n"
-  "foreach(other GSL::gsl fmt::fmt yaml-cpp lcm::lcm ves::plant)\n"
+  "foreach(other fmt::fmt yaml-cpp lcm::lcm ves::plant)\n"
   "  if(TARGET \${other})\n    message(FATAL_ERROR \"brings \${other}\")\n  endif()\nendforeach()\n")
 run(${CMAKE_COMMAND} -S ${WORK}/alone -B ${WORK}/alone/build -DCMAKE_PREFIX_PATH=${WORK}/prefix)
 # No public header shows a library that its component does not link.

@@ -19,7 +19,7 @@ struct SampledOscillator {
   double damping_ratio = 0.0;    // [-] zeta, 0 to less than 1
 };
 
-/// Roots of the characteristic equation (E.11) by GSL: the pair, then the real third root.
+/// Roots of the characteristic equation (E.11): the pair, then the real third root.
 std::array<std::complex<double>, 3> roots(const SampledOscillator& oscillator);
 
 /// {x, x', x''} from one sample to the next, (E.9), at omega = 1. Two of its entries are

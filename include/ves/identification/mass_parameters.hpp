@@ -30,7 +30,7 @@ struct SeparableCombinations {
   Eigen::Index rank() const { return C.rows(); }
 };
 
-/// By the singular values of the regressor over many poses: GSL's SVD decides the rank. Parameters
+/// By the singular values of the regressor over many poses, which decide the rank. Parameters
 /// nearer the base lead; what cannot be told from them is added to them. On a base that tilts about
 /// two axes.
 SeparableCombinations separableCombinations(const RobotModel& robot);
@@ -69,7 +69,7 @@ struct StaticSetup {
 /// Regressor of a rest's counts: 6 x 4(n+1).
 Eigen::MatrixXd countRegressor(const StaticSetup& setup, const JointVector& q, const Vec3& rpy);
 
-/// Weighted least squares (GSL's SVD) for the combinations, six biases and their drift in time;
+/// Weighted least squares for the combinations, six biases and their drift in time;
 /// channels weigh by their own residual. Throws std::domain_error when the rests are too few or do
 /// not determine them.
 MassEstimate estimateMasses(const StaticSetup& setup, const SeparableCombinations& combinations,

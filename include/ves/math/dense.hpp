@@ -28,6 +28,16 @@ struct SymmetricEigen {
   Eigen::MatrixXd vectors;
 };
 SymmetricEigen symmetricEigen(const Eigen::MatrixXd& A);
+/// Of A x = value B x, of length one in B, which is symmetric too; empty where B is not positive
+/// definite.
+SymmetricEigen symmetricEigen(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B);
+
+/// A = U diag(s) V^T, rows >= columns, s falling.
+struct Svd {
+  Eigen::MatrixXd U, V;
+  Eigen::VectorXd s;
+};
+Svd svd(const Eigen::MatrixXd& A);
 
 /// e^A of a square matrix.
 Eigen::MatrixXd exponential(const Eigen::MatrixXd& A);

@@ -4,18 +4,18 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
+#include <random>
 
 namespace ves::plant {
 
 /// Seeded Gaussian noise: the same seed gives the same values. Drawing allocates nothing.
 class Noise {
  public:
-  explicit Noise(std::uint32_t seed);
+  explicit Noise(std::uint32_t seed) : generator_(seed) {}
   double normal() noexcept;
 
  private:
-  std::unique_ptr<void, void (*)(void*)> generator_;  // GSL's, which no header of ours shows
+  std::mt19937 generator_;
 };
 
 }  // namespace ves::plant

@@ -70,9 +70,9 @@ struct InteractionPoint {
   ContactWatch contacts;  // up to now
 };
 
-/// GSL's Runge-Kutta Prince-Dormand (8, 9) with adaptive steps; where the tool begins or ceases to
-/// touch something, a step ends to 1e-12 s. Throws std::domain_error when the
-/// tolerance cannot be kept.
+/// Runge-Kutta-Fehlberg 7(8), by Boost, with adaptive steps; where the tool begins or ceases to
+/// touch something, a step ends to 1e-12 s. Throws std::domain_error when the tolerance cannot be
+/// kept.
 std::vector<InteractionPoint> simulate(const Interaction& interaction,
                                        const InteractionOptions& options);
 

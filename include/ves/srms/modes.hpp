@@ -13,9 +13,8 @@ struct Eigenmodes {
   Eigen::MatrixXd shapes;     // n x n, columns
 };
 
-/// By GSL's generalised symmetric-definite eigensolver. M must be symmetric positive definite, K
-/// symmetric positive semidefinite; throws std::domain_error when GSL
-/// finds that M is not.
+/// M must be symmetric positive definite, K symmetric positive semidefinite; throws
+/// std::domain_error where M is not.
 Eigenmodes eigenmodes(const Eigen::MatrixXd& M, const Eigen::MatrixXd& K);
 
 /// Mass-normalised modes of M x'' + C x' + K x = W: Phi^T M Phi = I, Phi^T K Phi = diag(stiffness),
