@@ -272,6 +272,32 @@ TEST(Flight, WhatItTakesHoldOfIsWhereTheVehicleIs) {
   EXPECT_EQ(gripped[0], gripped[1]);
 }
 
+TEST(Flight, WhatIsHeldStopsWithTheLaboratory) {
+  // The ball is in the hand when the flight ends: the grip feels no more than while it flew, and
+  // a ball that floats beside the hand goes on beside it.
+  for (const std::string grasp : {"{at_s: 1.3, grasp: {target: true}}", ""}) {
+    const RecordedRun run = recordLockstep(test::experiment(
+        "servicer_capture",
+        {"controller.moving_frame.enabled=true", "sensor.noise=false",
+         "base.free.velocity_m_per_s=[5, 2, 0]", "base.free.rate_deg_per_s=[0, 0, 3]",
+         "environment.target.velocity_m_per_s=[4.98, 2, 0]",
+         "program=!replace [{move: {}}, {calibration: {}}, {admittance: {duration_s: 4}, robot: [" +
+             grasp + "]}, {monitor: {duration_s: 1, interval_s: 1}}]"}));
+    ASSERT_TRUE(run.result.good());
+    double most[2] = {0.0, 0.0};  // [N] in flight and after it
+    Vec3 v = Vec3::Zero();        // [m/s] of the ball, at last
+    for (const Row& row : run.series.rows) {
+      if (row.state.phase != static_cast<std::int8_t>(Phase::kRunning)) continue;
+      const bool flies = inAdmittance(row.state);
+      double& force = most[flies ? 0 : 1];
+      force = std::max(force, Vec3::Map(row.truth.contact).norm());
+      if (!flies) v = Vec3::Map(row.truth.target_v);
+    }
+    EXPECT_LT(most[1], 1.5 * most[0] + 1.0) << grasp;
+    EXPECT_LT(v.norm(), 0.2) << grasp;  // five metres a second are the laboratory's
+  }
+}
+
 TEST(Flight, TheLaboratoryRestsWhereNothingIsEmulated) {
   const RecordedRun run = recordLockstep(test::experiment(
       "satellite_tumbling",

@@ -85,7 +85,7 @@ Plant::Plant(const PlantConfig& config)
 
 void Plant::command(const LegCommand& command) noexcept {
   watchdog_.take(command, now_);
-  laboratory_ = command.laboratory;
+  fly(command.laboratory);
   if (!command.engaged) return;
   if (command.segment < 0) {  // an operator's order: what the program began goes on
     outside_ = true;
@@ -102,6 +102,19 @@ void Plant::command(const LegCommand& command) noexcept {
   segment_start_ = now_;
   began_[static_cast<std::size_t>(segment_)] = now_;
   planRobotEvent();
+}
+
+/// Where the laboratory stops, what floats stops with it, and keeps what it did beside it.
+void Plant::fly(const Laboratory& laboratory) noexcept {
+  const BodyMotion before = laboratory_.at(now_);
+  const bool flew = laboratory_.flies() && !(before.v.isZero(0.0) && before.w.isZero(0.0)),
+             rests = laboratory.E_H.v.isZero(0.0) && laboratory.E_H.w.isZero(0.0);
+  laboratory_ = laboratory;
+  if (!flew || !rests || !config_.task.world) return;
+  Floating& target = truth_.target;
+  target.v -= before.v + before.w.cross(target.X_IB().p - config_.geometry.home() - before.X.p);
+  target.w -= before.w;
+  tool_ = toolMotion();
 }
 
 /// The next event of this segment that is still to come.
@@ -222,9 +235,12 @@ void Plant::moveActuators(std::int64_t to) noexcept {
     wear();
     hydraulic_->advance(currents, dt);
   } else {
-    const double decay = std::exp(-dt / config_.actuator.tau);
+    if (dt != passed_) {  // most are alike
+      passed_ = dt;
+      decay_ = std::exp(-dt / config_.actuator.tau);
+    }
     for (std::size_t i = 0; i < kLegs; ++i)
-      actuators_[i].advance(currents(static_cast<Eigen::Index>(i)), dt, decay);
+      actuators_[i].advance(currents(static_cast<Eigen::Index>(i)), dt, decay_);
   }
   now_ = to;
 }

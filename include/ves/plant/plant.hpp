@@ -145,6 +145,7 @@ class Plant {
   void readSensor() noexcept;
   void averageSensor(Sample& sample) const noexcept;
   void readJoints() noexcept;
+  void fly(const Laboratory& laboratory) noexcept;
   void planRobotEvent() noexcept;
   void startRobotEvents() noexcept;
   Wrench sensorLoad() noexcept;
@@ -163,6 +164,7 @@ class Plant {
   Transform X_SL0_;
   std::vector<LegSlave> slaves_;
   std::vector<Actuator> actuators_;             // ideal legs
+  double passed_ = 0.0, decay_ = 1.0;           // [s] last, [-] e^{-dt/tau} of it
   std::optional<HydraulicPlatform> hydraulic_;  // or the platform on those that feel it
   Vec6 magnets_;                                // [m] of their transducers
   LegWatchdog watchdog_;
