@@ -3,6 +3,7 @@
 // ves commission: from a machine that nobody has told about to one belief file.
 #include "commands.hpp"
 #include "runner.hpp"
+#include "ves/core/build.hpp"
 #include "ves/validation/commissioning.hpp"
 #include "ves/validation/page.hpp"
 
@@ -42,8 +43,8 @@ int commission(RunnerOptions& options, const CommissioningOptions& wanted) {
   const Experiment believing = options.load();
   const std::vector<Table> tables =
       tablesOf(series, c, found, forecastError(scenario, believing, found));
-  const std::string use =
-      fmt::format("./ves run {} --belief {}", options.scenario, file.lexically_normal().string());
+  const std::string use = fmt::format("{} run {} --belief {}", frontDoor(), options.scenario,
+                                      file.lexically_normal().string());
   Page page;
   page.section("To use it");
   page.text(use);

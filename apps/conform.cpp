@@ -5,6 +5,7 @@
 #include "app.hpp"
 #include "commands.hpp"
 #include "ves/bus/channels.hpp"
+#include "ves/core/build.hpp"
 #include "ves/realtime/realtime.hpp"
 #include "ves/run/announcer.hpp"
 
@@ -32,8 +33,8 @@ std::vector<Requirement> listen(const Experiment& experiment, const std::string&
   for (bool announced = false; !judge && !stop_requested && monotonicNow() - start < kFirstSample;
        bus.wait(100))
     if (monotonicNow() - start > kTold && !std::exchange(announced, true))
-      fmt::print(stderr,
-                 "waiting up to 10 s for samples on {}: a driver, or ./ves plant SCENARIO\n", url);
+      fmt::print(stderr, "waiting up to 10 s for samples on {}: a driver, or {} plant SCENARIO\n",
+                 url, frontDoor());
   if (!judge) return {{"samples", "heard", "none in 10 s", false}};
   const std::int64_t end = monotonicNow() + static_cast<std::int64_t>(seconds * 1e9);
   const leg_command_t hello = toMessage(LegCommand(), header(self, -1, 0));
@@ -161,9 +162,8 @@ int conformCommand(int argc, char** argv) {
       fmt::print("{} {:<16} {:<42} {}\n", r.kept ? "ok" : "NO", r.name, r.asked, r.found);
     if (moves && !well) fmt::print("nothing was moved\n");
     if (all.front().name == std::string("samples") && !all.front().kept)
-      fmt::print(
-          "no machine is heard on {}: start yours, or ./ves plant {} to see one that passes\n",
-          options.process.url, options.scenario);
+      fmt::print("no machine is heard on {}: start yours, or {} plant {} to see one that passes\n",
+                 options.process.url, frontDoor(), options.scenario);
     return std::all_of(all.begin(), all.end(), kept) ? kDone : kTripped;
   });
 }

@@ -6,6 +6,7 @@
 
 #include "commands.hpp"
 #include "runner.hpp"
+#include "ves/core/build.hpp"
 #include "ves/doctor/doctor.hpp"
 #include "ves/evaluation/summary.hpp"
 #include "ves/run/process.hpp"
@@ -129,7 +130,7 @@ int doctorCommand(int argc, char** argv) {
     show("sample to command", ours,
          fmt::format("our controller in between: {:.2f} x", ours.median / bare.median));
     if (!ran) {
-      fmt::print("BAD    a run of our own did not end well: try ./ves demo\n");
+      fmt::print("BAD    a run of our own did not end well: try {} demo\n", frontDoor());
       return kTripped;
     }
     if (const std::string rejected = loop.value("samples_rejected", ""); !rejected.empty())

@@ -134,12 +134,12 @@ void printManual() {
 
 void printUsage(FILE* to) {
   fmt::print(to, "usage: ves COMMAND [ARGUMENT...]\n\n");
-  for (const Command& c : kCommands) fmt::print(to, "  {:<12}{}\n", c.name, c.purpose);
+  for (const Command& c : kCommands) fmt::print(to, "  {:<13}{}\n", c.name, c.purpose);
   fmt::print(to,
-             "  {:<12}{}\n  {:<12}{}\n\n`ves COMMAND --help` tells the rest; --version: which "
+             "  {:<13}{}\n  {:<13}{}\n\n`ves COMMAND --help` tells the rest; --version: which "
              "build this is.\n",
-             "completion", "for bash: eval \"$(./ves completion)\"", "man",
-             "the manual page: ./ves man | man -l -");
+             "completion", fmt::format("for bash: eval \"$({} completion)\"", frontDoor()), "man",
+             fmt::format("the manual page: {} man | man -l -", frontDoor()));
 }
 
 int dispatch(int argc, char** argv) {

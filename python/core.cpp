@@ -251,6 +251,7 @@ py::tuple runOf(const Path& file, const Strings& overrides) {
 PYBIND11_MODULE(_core, m) {
   using namespace ves;
   m.attr("version") = describeBuild();
+  m.attr("takes_numpy_2") = PYBIND11_VERSION_HEX >= 0x020C0000;
   // Of the checkout that it was built in, or as it is installed.
   const bool built_here = std::filesystem::exists(VES_PYTHON_CONFIG "/ves.yaml");
   m.attr("config") = built_here ? VES_PYTHON_CONFIG : "/usr/share/ves/config";

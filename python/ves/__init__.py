@@ -26,11 +26,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-if int(np.__version__.split(".")[0]) > 1:  # what it was compiled with ends the process there
+from . import _core
+
+# What an older pybind11 compiled ends the process there.
+if int(np.__version__.split(".")[0]) > 1 and not _core.takes_numpy_2:
     raise ImportError(f"ves was built for NumPy 1, this is NumPy {np.__version__}: use Debian's python3, "
                       "or pip install 'numpy<2'")
 
-from . import _core
 from ._core import InputError
 from .experiment_t import experiment_t
 from .header_t import header_t
@@ -435,7 +437,8 @@ def loop_margins(scenario: str, settings: Mapping[str, object] = None) -> dict:
 
 def config_folder() -> pathlib.Path:
     """Where scenarios, robots, bases and platforms are: VES_CONFIG_DIR, or those that came with this."""
-    return pathlib.Path(os.environ.get("VES_CONFIG_DIR", _core.config))
+    own = pathlib.Path(__file__).parent / "share/ves/config"  # of a wheel
+    return pathlib.Path(os.environ.get("VES_CONFIG_DIR", own if own.exists() else _core.config))
 
 
 def _scenario(name: str):

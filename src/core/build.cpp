@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/core/build.hpp"
 
+#include <filesystem>
+
 #include "ves/core/revision.hpp"
 
 namespace ves {
@@ -52,6 +54,12 @@ std::string_view arithmeticOf(std::string_view description) {
   const std::size_t at = description.rfind(kSeparator);
   return at == std::string_view::npos ? std::string_view{}
                                       : description.substr(at + kSeparator.size());
+}
+
+std::string_view frontDoor() {
+  std::error_code error;
+  const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
+  return program.parent_path().filename() == "bin" ? "ves" : "./ves";
 }
 
 }  // namespace ves

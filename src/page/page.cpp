@@ -14,9 +14,14 @@
 namespace ves {
 namespace {
 
-/// What the page is made of beside its own sources: Debian's libjs-three and libjs-dygraphs.
+/// What the page is made of beside its own sources: of a wheel, or Debian's libjs-three and
+/// libjs-dygraphs.
 std::string library(const char* file) {
-  const std::string path = fmt::format("/usr/share/javascript/{}", file);
+  std::error_code error;
+  const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
+  const auto own = program.parent_path().parent_path() / "share/ves/javascript" / file;
+  const bool there = std::filesystem::exists(own, error);
+  const std::string path = there ? own.string() : fmt::format("/usr/share/javascript/{}", file);
   std::ifstream in(path);
   std::ostringstream text;
   text << in.rdbuf();

@@ -10,6 +10,7 @@
 #include <cstring>
 #include <fstream>
 
+#include "ves/core/build.hpp"
 #include "ves/core/lines.hpp"
 #include "ves/evaluation/contact_pairs.hpp"
 #include "ves/evaluation/identified.hpp"
@@ -81,7 +82,7 @@ std::string writeResults(const std::filesystem::path& folder, const RunResult& r
   const std::string shown = (below ? here : folder).string();
   constexpr std::size_t kColumns = 80, kBehindNames = 11;
   return folded(out + fmt::format("  {}\n    {}\n", shown, files), kColumns, kBehindNames) +
-         fmt::format("  see it: ./ves view {}\n", shown);
+         fmt::format("  see it: {} view {}\n", frontDoor(), shown);
 }
 
 void Progress::show(Phase phase, int segment, std::int64_t tick, const double (&x)[6]) {

@@ -3,6 +3,7 @@
 
 #include "process_conduct.hpp"
 #include "ves/bus/channels.hpp"
+#include "ves/core/build.hpp"
 #include "ves/realtime/latency.hpp"
 #include "ves/realtime/realtime.hpp"
 #include "ves/run/announcer.hpp"
@@ -150,8 +151,8 @@ RunResult runController(const Experiment& experiment, const ProcessOptions& opti
     if (!told && monotonicNow() - start > kWarnAfter) {
       told = true;
       fmt::print(stderr,
-                 "controller: waiting for a machine on {}: ./ves plant SCENARIO, or a driver\n",
-                 options.url);
+                 "controller: waiting for a machine on {}: {} plant SCENARIO, or a driver\n",
+                 options.url, frontDoor());
     }
     const std::string why = notLetIn(link, bus);
     if (monotonicNow() - start > kFirstSampleTime)

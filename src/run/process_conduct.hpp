@@ -7,6 +7,7 @@
 
 #include <cstdio>
 
+#include "ves/core/build.hpp"
 #include "ves/realtime/realtime.hpp"
 #include "ves/run/run.hpp"
 
@@ -14,7 +15,8 @@ namespace ves {
 
 inline void enableRealtime(const char* who, int priority, bool required) {
   if (const std::string refused = claimRealtime(priority, required); !refused.empty())
-    fmt::print(stderr, "{}: runs at best effort: {}; ./ves doctor says more\n", who, refused);
+    fmt::print(stderr, "{}: runs at best effort: {}; {} doctor says more\n", who, refused,
+               frontDoor());
 }
 
 inline void warnOfOpenBus(const char* who, const std::string& url) {

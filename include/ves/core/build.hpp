@@ -25,4 +25,7 @@ std::string describeBuild();
 /// The arithmetic of a line that describeBuild() made; empty when it is not one.
 std::string_view arithmeticOf(std::string_view description);
 
+/// How a person calls this program: "./ves" in the checkout that it was built in, else "ves".
+std::string_view frontDoor();
+
 }  // namespace ves

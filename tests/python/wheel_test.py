@@ -1,0 +1,64 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""The wheel in bare environments: it runs, with either NumPy, and brings nothing that is under the GPL.
+
+Exit status 77 where no package index can be reached.
+"""
+
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+PROGRAM = """
+import numpy, ves
+run = ves.run("z_sine", {"legs.tau_s": 0.01}, seed=1)
+assert run.phase == "parked", run.phase
+assert abs(run["z_actual_m"]).max() > 0.15
+assert "site-packages" in str(ves.config_folder()), ves.config_folder()
+platform = ves.load_platform("desk")
+lengths = ves.leg_lengths(platform, numpy.zeros((1000, 6)))
+assert numpy.allclose(ves.forward_pose(platform, lengths), 0.0, atol=1e-9)
+print(numpy.__version__)
+"""
+
+
+def run(*command, cwd):
+    bare = {"PATH": "/usr/bin:/bin", "HOME": str(cwd), "LANG": "C.UTF-8"}
+    done = subprocess.run([str(word) for word in command], cwd=cwd, env=bare, text=True, capture_output=True)
+    if done.returncode != 0:
+        sys.exit(f"{' '.join(map(str, command))}: {done.returncode}\n{done.stdout}{done.stderr}")
+    return done.stdout
+
+
+def main():
+    with tempfile.TemporaryDirectory() as folder:
+        folder = pathlib.Path(folder)
+        subprocess.run(["/usr/bin/python3", "-m", "venv", folder / "env"], check=True)
+        pip, python, ves = (folder / "env/bin" / name for name in ("pip", "python", "ves"))
+        if subprocess.run([pip, "download", "--no-deps", "--quiet", "wheel", "-d", folder],
+                          capture_output=True).returncode != 0:
+            print("no package index")
+            sys.exit(77)
+        built = subprocess.run([ROOT / "ves", "wheel"], text=True, capture_output=True)
+        if built.returncode != 0:
+            sys.exit(built.stderr)
+        wheel = pathlib.Path(built.stdout.split()[-1])
+        assert "manylinux" in wheel.name, wheel.name
+        run(pip, "install", "--quiet", wheel, cwd=folder)
+        print(run(ves, "--version", cwd=folder).strip())
+        run(ves, "demo", "--lockstep", "--out", "demo", cwd=folder)
+        run(ves, "view", "demo", "--html", "demo.html", cwd=folder)
+        assert (folder / "demo.html").stat().st_size > 500_000
+        run(ves, "sweep", "z_sine", "--vary", "legs.tau_s=0.005,0.01", "--out", "table.csv", cwd=folder)
+        assert run(python, "-c", PROGRAM, cwd=folder).startswith("2.")
+        run(pip, "install", "--quiet", "numpy<2", cwd=folder)
+        assert run(python, "-c", PROGRAM, cwd=folder).startswith("1.")
+        names = os.listdir(next(folder.glob("env/lib/python*/site-packages/ves.libs")))
+        assert any("lcm" in name for name in names) and not any("gsl" in name for name in names), names
+        print(f"{wheel.name}: {wheel.stat().st_size / 1e6:.1f} MB, {len(names)} libraries")
+
+
+main()
