@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <boost/numeric/odeint/stepper/controlled_runge_kutta.hpp>
-#include <boost/numeric/odeint/stepper/runge_kutta_fehlberg78.hpp>
+#include <boost/numeric/odeint/stepper/runge_kutta_cash_karp54.hpp>
 #include <stdexcept>
 #include <vector>
 
@@ -74,6 +74,7 @@ class Equations {
       const JointState q = robot_.at(now_);
       const BodyMotion P = platform(q, seconds(now_), y);
       robot_.begin(action, now_);
+      composite_of_.reset();
       if (loads) each([&](const auto& v) { v.load(riding(q, seconds(now_)), P, y); });
     }
   }
@@ -142,7 +143,13 @@ class Equations {
     return each([](const auto& v) { return v.size(); });
   }
   static double seconds(std::int64_t ns) { return static_cast<double>(ns) * kSecondPerNanosecond; }
-  RidingRobot riding(const JointState& q, double t) const { return {robot_.model(), X_PL0_, q, t}; }
+  RidingRobot riding(const JointState& q, double t) const {
+    if (!composite_of_ || *composite_of_ != q.q) {  // most of the time it stands
+      composite_of_ = q.q;
+      composite_L0_ = compositeBody(robot_.model(), q.q);
+    }
+    return {robot_.model(), X_PL0_, q, t, composite_L0_};
+  }
   BodyMotion platform(const JointState& q, double t, const VectorXd& y) const {
     return each([&](const auto& v) { return v.platform(riding(q, t), y); });
   }
@@ -172,9 +179,12 @@ class Equations {
   std::optional<Transform> X_TB_;  // of the target, in the tool's grip
   ContactWatch contacts_;
   std::optional<BegunPush> push_;
+  mutable std::optional<JointVector> composite_of_;
+  mutable RigidBody composite_L0_;
 };
 
-/// Runge, Kutta and Fehlberg's steps of eighth order, as long as the tolerance lets them be.
+/// Runge and Kutta's steps, of fifth order as Cash and Karp have it, as long as the tolerance lets
+/// them be.
 class Solver {
  public:
   Solver(const Equations& equations, const InteractionOptions& options)
@@ -212,7 +222,7 @@ class Solver {
 
  private:
   using State = std::vector<double>;
-  using Stepper = odeint::runge_kutta_fehlberg78<State>;
+  using Stepper = odeint::runge_kutta_cash_karp54<State>;
   using Checker =
       odeint::default_error_checker<double, odeint::range_algebra, odeint::default_operations>;
   struct Rates {

@@ -17,13 +17,15 @@ namespace {
 
 constexpr Eigen::Index kAttitude = 3, kMomentum = 7, kStates = 13;  // of a free body
 
-/// What the vehicle feels of the robot, about Po in P.
+/// What the vehicle feels of the robot, about Po in P. One that stands is one body.
 Wrench reaction(const RidingRobot& robot, const ProperMotion& L0) {
-  return transfer(robot.X_PL0, Wrench{} - newtonEuler(robot.model, robot.q, L0).F_L0o_L0);
+  const Wrench on_robot = robot.stands() ? inertialWrench(robot.composite_L0, L0)
+                                         : newtonEuler(robot.model, robot.q, L0).F_L0o_L0;
+  return transfer(robot.X_PL0, Wrench{} - on_robot);
 }
 
 RigidBody lockedInP(const RidingRobot& robot) {
-  return combine(RigidBody{}, robot.X_PL0, compositeBody(robot.model, robot.q.q));
+  return combine(RigidBody{}, robot.X_PL0, robot.composite_L0);
 }
 
 }  // namespace
@@ -50,7 +52,7 @@ VectorXd ModalEquations::start(const RidingRobot&) const {
 void ModalEquations::begin(const RidingRobot& robot, std::int64_t step, const VectorXd&) {
   if (options_.hold_mass == 0 || step % options_.hold_mass != 0 || step == held_at_) return;
   held_at_ = step;
-  held_ = compositeBody(robot.model, robot.q.q);
+  held_ = robot.composite_L0;
 }
 
 /// Its accelerations but for those of the modes.
@@ -76,7 +78,7 @@ void ModalEquations::derivative(const RidingRobot& robot, const VectorXd& y, con
   else
     whole(robot, y, A, right);
   const PathPoint<6> ground = ground_.at(robot.t);
-  right += jacobian(y, ground).transpose() * F_Po_I.stacked();
+  if (const Vec6 F = F_Po_I.stacked(); !F.isZero(0.0)) right += jacobian(y, ground).transpose() * F;
   if (ground_.moves()) right -= leastSquares(base_.Phi, ground.x_ddot);
   dy.segment(k, k) = solvePositive(A, right);
 }
@@ -138,12 +140,12 @@ namespace {
 
 /// Of vehicle and robot, its joints locked, about Po in I.
 Mat6 massOf(const RigidBody& body_P, const RidingRobot& robot, const Mat3& R_IP) {
-  return spatialMass(
-      rotated(R_IP, combine(body_P, robot.X_PL0, compositeBody(robot.model, robot.q.q))));
+  return spatialMass(rotated(R_IP, combine(body_P, robot.X_PL0, robot.composite_L0)));
 }
 
 /// Of the joints alone, about Po in I.
 Vec6 momentumOfJoints(const RidingRobot& robot, const Mat3& R_IP) {
+  if (robot.stands()) return Vec6::Zero();
   const Wrench of_L0 = Wrench::from(jointMomentum(robot.model, robot.q.q, robot.q.q_dot));
   return rotate(R_IP, transfer(robot.X_PL0, of_L0)).stacked();
 }

@@ -15,7 +15,10 @@ struct RidingRobot {
   const RobotModel& model;
   const Transform& X_PL0;
   JointState q;
-  double t = 0.0;  // [s] since they were let go
+  double t;                       // [s] since they were let go
+  const RigidBody& composite_L0;  // with its joints locked
+
+  bool stands() const { return q.q_dot.isZero(0.0) && q.q_ddot.isZero(0.0); }
 };
 
 /// y = {eta, eta'}; without modes one number that stays.

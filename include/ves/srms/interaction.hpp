@@ -70,7 +70,7 @@ struct InteractionPoint {
   ContactWatch contacts;  // up to now
 };
 
-/// Runge-Kutta-Fehlberg 7(8), by Boost, with adaptive steps; where the tool begins or ceases to
+/// Cash and Karp's Runge-Kutta 5(4), by Boost, with adaptive steps; where the tool begins or ceases to
 /// touch something, a step ends to 1e-12 s. Throws std::domain_error when the tolerance cannot be
 /// kept.
 std::vector<InteractionPoint> simulate(const Interaction& interaction,
