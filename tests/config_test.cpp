@@ -374,6 +374,16 @@ INSTANTIATE_TEST_SUITE_P(
             "base.free.thrusters=[{at_m: [0, 0, 0], force_n: [0, 1, 0], least_on_s: 0.5, "
             "firings_s: [[1, 1.1]]}]",
             "[1, 1.1] is shorter than least_on_s of 0.5"},
+        Bad{"wheel_without_axis", "satellite_hold",
+            "base.free.wheels=[{axis: [0, 0, 0], most_nms: 1, torques_s_nm: [[1, 2, 1]]}]",
+            "base.free.wheels[0].axis: no direction"},
+        Bad{"wheel_that_is_full", "satellite_hold",
+            "base.free.wheels=[{axis: [0, 0, 1], most_nms: 1.5, torques_s_nm: [[1, 2, 1], [3, 4, "
+            "1]]}]",
+            "after 4 s the wheel has -2 N m s, want at most most_nms of 1.5"},
+        Bad{"wheel_torque_that_ends_first", "satellite_hold",
+            "base.free.wheels=[{axis: [0, 0, 1], most_nms: 9, torques_s_nm: [[2, 1, 1]]}]",
+            "[2, 1, 1], want each to end after it begins"},
         Bad{"hold_without_torque", "satellite_hold", "base.free.attitude_hold.torque_nm=[0, 0, 0]",
             "base.free.attitude_hold.torque_nm: none, want one about some axis"},
         Bad{"hold_without_a_band", "satellite_hold", "base.free.attitude_hold.dead_band_deg=0",

@@ -10,6 +10,7 @@
 
 #include "support/momentum.hpp"
 #include "support/rig.hpp"
+#include "ves/evaluation/summary.hpp"
 #include "ves/kinematics/stewart.hpp"
 #include "ves/math/dense.hpp"
 #include "ves/robot/momentum.hpp"
@@ -521,6 +522,64 @@ TEST(Thrusters, ADeadBandHasItsLimitCycle) {
       EXPECT_NEAR(most, hold.dead_band, 1e-3 * hold.dead_band) << axis;
     }
   }
+}
+
+TEST(ReactionWheels, TurnABodyThatTumbles) {
+  // About its axis of symmetry a body keeps momentum and wheel's together, here none, so that the
+  // axis goes round the rest as if there were no wheel: R = Rx(w t) Rz(what the wheel has turned).
+  FreeBodyModel vehicle;
+  vehicle.body_P = {80.0, Vec3::Zero(), Vec3(10.0, 10.0, 25.0).asDiagonal()};
+  vehicle.w_IP_I = {0.3, 0.0, 0.0};
+  ReactionWheel& wheel = vehicle.propulsion.wheels[0];
+  vehicle.propulsion.wheel_count = 1;
+  wheel.torques[0] = {{1.0, 3.0}, 5.0};
+  wheel.torques[1] = {{6.0, 7.0}, -10.0};
+  wheel.size = 2;
+  const BothWays both(vehicle, 20.0);
+  const auto turned = [](double from, double until, double rate, double t) {
+    const double on = std::clamp(t - from, 0.0, until - from);
+    return rate * (0.5 * on * on + on * std::max(0.0, t - until));
+  };
+  for (const auto* x : {&both.model, &both.truth})
+    for (std::size_t n = 0; n < x->size(); n += 7) {
+      const double t = static_cast<double>(n) * kTick,
+                   phi = turned(1.0, 3.0, 0.2, t) + turned(6.0, 7.0, -0.4, t);
+      const Mat3 R = rotationOf(Vec3(0.3 * t, 0.0, 0.0)) * rotationOf(Vec3(0.0, 0.0, phi));
+      EXPECT_LT((rotation(Vec3((*x)[n].tail<3>())) - R).norm(), 1e-8) << t;
+    }
+  EXPECT_NEAR(wheel.momentum(10.0), 0.0, 1e-12);
+  // What the wheel puts in and takes is all that changes the body's energy.
+  FreeBody body(vehicle, kTick);
+  body.reset(Vec6::Zero());
+  const double first = body.energy();
+  double put_in = 0.0, most = 0.0;
+  std::vector<BodyMotion> motions;
+  for (int n = 0; n < 800; ++n) {
+    body.step(Wrench{});
+    put_in += body.shaken();
+    most = std::max(most, put_in);
+    EXPECT_NEAR(body.energy() - first, put_in, 1e-3 * most + 1e-12);
+    motions.push_back(body.bodyMotion());
+  }
+  for (std::size_t n = 110; n < 290; ++n)  // while the first torque lasts
+    EXPECT_LT((motions[n].alpha - (motions[n + 1].w - motions[n - 1].w) / (2.0 * kTick)).norm(),
+              1e-5);
+  EXPECT_NEAR(most, 0.5 * 25.0 * 0.4 * 0.4, 1e-3);
+}
+
+TEST(ReactionWheels, TurnAVehicleUnderARobotAsTheTruthDoes) {
+  // PUMA on half a ton, moving while wheels about two axes give and take; centre of mass elsewhere.
+  const RecordedRun run = recordLockstep(test::experiment(
+      "satellite_puma",
+      {"sensor.noise=false",
+       "base.free.wheels=[{axis: [0, 0, 1], most_nms: 20, torques_s_nm: [[1, 4.5, 0.8], [8, 11, "
+       "-1.2]]}, {axis: [1, 1, 0], most_nms: 20, torques_s_nm: [[2.005, 5, 0.4]]}]"}));
+  ASSERT_TRUE(run.result.good());
+  const auto summary = summarise(run.series, run.result);
+  const auto of = [&](const char* key) { return summary[key].get<double>(); };
+  EXPECT_GT(of("emulation_travel_rad"), 0.1);
+  EXPECT_LT(of("emulation_error_rms_rad"), 2e-3 * of("emulation_travel_rad"));
+  EXPECT_LT(of("emulation_error_rms_m"), 2e-3 * of("emulation_travel_m"));
 }
 
 TEST(Thrusters, KeepTheModelWhereTheyKeepTheTruth) {

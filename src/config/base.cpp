@@ -250,6 +250,34 @@ AttitudeHold readHold(Section s) {
   return out;
 }
 
+ReactionWheel readWheel(Section s) {
+  constexpr double kLongest = 1e5;  // [s]
+  ReactionWheel out;
+  out.axis_P = s.vector("axis", 3, -1e3, 1e3);
+  if (!(out.axis_P.norm() > 0.0)) s.fail("axis", "no direction");
+  out.axis_P.normalize();
+  const double most = s.number("most_nms", 0.0, 1e6);
+  const Eigen::MatrixXd rows = s.matrix("torques_s_nm", -1, 3, -1e5, kLongest);
+  if (rows.rows() > ReactionWheel::kMostTorques)
+    s.fail("torques_s_nm",
+           fmt::format("{} of them, want at most {}", rows.rows(), ReactionWheel::kMostTorques));
+  for (Eigen::Index i = 0; i < rows.rows(); ++i) {
+    const Firing on{rows(i, 0), rows(i, 1)};
+    if (!(on.from >= 0.0 && on.until > on.from) || (i > 0 && !(on.from >= rows(i - 1, 1))))
+      s.fail("torques_s_nm",
+             fmt::format("[{}, {}, {}], want each to end after it begins, and to begin after the "
+                         "one before",
+                         on.from, on.until, rows(i, 2)));
+    out.torques[static_cast<std::size_t>(out.size++)] = {on, rows(i, 2)};
+    if (const double taken = out.momentum(on.until); !(std::abs(taken) <= most))
+      s.fail("torques_s_nm",
+             fmt::format("after {} s the wheel has {:.4g} N m s, want at most most_nms of {}",
+                         on.until, taken, most));
+  }
+  s.finish();
+  return out;
+}
+
 /// A body that floats.
 Base readFree(Section& s) {
   FreeBodyModel free;
@@ -264,6 +292,13 @@ Base readFree(Section& s) {
         section.fail("thrusters", fmt::format("more than {}", Thruster::kMost));
       free.propulsion.thrusters[static_cast<std::size_t>(free.propulsion.size++)] =
           readThruster(one);
+    }
+  if (section.has("wheels"))
+    for (Section one : section.list("wheels")) {
+      if (free.propulsion.wheel_count == ReactionWheel::kMost)
+        section.fail("wheels", fmt::format("more than {}", ReactionWheel::kMost));
+      free.propulsion.wheels[static_cast<std::size_t>(free.propulsion.wheel_count++)] =
+          readWheel(one);
     }
   if (section.has("attitude_hold"))
     free.propulsion.hold = readHold(section.section("attitude_hold"));

@@ -169,6 +169,7 @@ VectorXd FreeBodyEquations::stateOf(const RidingRobot& robot, const BodyMotion& 
   const Vec3 p = P.X.p - p_IH_;
   Vec6 momentum = massOf(model_.body_P, robot, P.X.R) * (Vec6() << P.v, P.w).finished() +
                   momentumOfJoints(robot, P.X.R);
+  momentum.tail<3>() += P.X.R * wheelMomentum(model_.propulsion, robot.t);
   momentum.tail<3>() += p.cross(momentum.head<3>());  // about home
   VectorXd y(kStates);
   y << p, Eigen::Quaterniond(P.X.R).coeffs(), momentum / mass_;
@@ -182,6 +183,7 @@ BodyMotion FreeBodyEquations::platform(const RidingRobot& robot, const VectorXd&
   Vec6 momentum = mass_ * y.segment<6>(kMomentum);
   momentum.tail<3>() -= p.cross(momentum.head<3>());
   momentum -= momentumOfJoints(robot, P.X.R);
+  momentum.tail<3>() -= P.X.R * wheelMomentum(model_.propulsion, robot.t);
   const Vec6 V = massOf(model_.body_P, robot, P.X.R).llt().solve(momentum);
   P.v = V.head<3>();
   P.w = V.tail<3>();

@@ -32,11 +32,11 @@ Vec3 rotationRate(const Vec3& th, const Vec3& w) noexcept {
 Vec6 velocity(const RigidState& s) noexcept { return (Vec6() << s.v, s.w).finished(); }
 
 /// The same with the acceleration under F.
-BodyMotion motionOf(const Mat6& M_P, const RigidState& s, const Wrench& F_Po_I) noexcept {
-  const Lumped body(M_P);
-  const Vec3 c = s.R_IP * body.center;
+BodyMotion motionOf(const Gyrostat& whole, const RigidState& s, const Wrench& F_Po_I) noexcept {
+  const Lumped body(whole.M_P);
+  const Vec3 c = s.R_IP * body.center, h = s.R_IP * whole.h_P;
   const Mat3 J = s.R_IP * body.inertia * s.R_IP.transpose();
-  const Vec3 alpha = J.inverse() * (F_Po_I.n - c.cross(F_Po_I.f) - s.w.cross(J * s.w));
+  const Vec3 alpha = J.inverse() * (F_Po_I.n - c.cross(F_Po_I.f) - s.w.cross(J * s.w + h));
   const Vec3 a = F_Po_I.f / body.mass - alpha.cross(c) - s.w.cross(s.w.cross(c));
   return {{s.R_IP, s.p}, s.v, s.w, a, alpha};
 }
@@ -52,16 +52,16 @@ ModalModel linearised(const FreeBodyModel& model) {
   return out;
 }
 
-RigidState advanced(const Mat6& M_P, const Mat6& M_then_P, const RigidState& from, const Wrench& F,
-                    double dt) noexcept {
+RigidState advanced(const Gyrostat& body, const Gyrostat& then, const RigidState& from,
+                    const Wrench& F, double dt) noexcept {
   constexpr double kMostTurn = 0.005;  // [rad] in a step
   constexpr double kMostSteps = 1e3;   // [-] a turn as fast as that is no vehicle's
   if (dt == 0.0) return from;
-  const Lumped at_first(M_P), at_last(M_then_P);
+  const Lumped at_first(body.M_P), at_last(then.M_P);
   const Vec3 c_first = from.R_IP * at_first.center, shift_P = at_last.center - at_first.center;
   const Mat3 reshape = at_last.inertia - at_first.inertia;
   const Vec3 v_c = from.v + from.w.cross(c_first), a_c = F.f / at_last.mass;
-  Vec3 L = from.R_IP * (at_first.inertia * (from.R_IP.transpose() * from.w));
+  Vec3 L = from.R_IP * (at_first.inertia * (from.R_IP.transpose() * from.w) + body.h_P);
 
   const double turn =
       std::abs(dt) * (from.w.norm() + std::abs(dt) * (F.n - c_first.cross(F.f)).norm() *
@@ -81,7 +81,8 @@ RigidState advanced(const Mat6& M_P, const Mat6& M_then_P, const RigidState& fro
       const double share = (i + part) / steps;
       const Mat3 R = rotationOf(th) * to.R_IP;
       const Mat3 mobility = (at_first.inertia + share * reshape).inverse();
-      const Vec3 w = R * (mobility * (R.transpose() * momentum)),
+      const Vec3 h_P = body.h_P + share * (then.h_P - body.h_P);
+      const Vec3 w = R * (mobility * (R.transpose() * momentum - h_P)),
                  c = R * (at_first.center + share * shift_P), c_dot = R * shift_P / dt;
       return {rotationRate(th, w), F.n - c.cross(F.f) + at_last.mass * w.cross(c).cross(c_dot),
               c_dot};
@@ -99,7 +100,7 @@ RigidState advanced(const Mat6& M_P, const Mat6& M_then_P, const RigidState& fro
   }
   to.R_IP = orthogonal(to.R_IP);
   const Vec3 c_last = to.R_IP * at_last.center;
-  to.w = to.R_IP * (at_last.inertia.inverse() * (to.R_IP.transpose() * L));
+  to.w = to.R_IP * (at_last.inertia.inverse() * (to.R_IP.transpose() * L - then.h_P));
   to.v = v_c + dt * a_c - to.w.cross(c_last);
   to.p = from.p + dt * (v_c + 0.5 * dt * a_c) + shifted - (c_last - c_first);
   return to;
@@ -110,18 +111,17 @@ FreeBody::FreeBody(const FreeBodyModel& model, double period)
       M_P_(spatialMass(model.body_P)),
       beside_({Mat6::Identity(), Vec6::Zero(), Mat6::Zero()}),
       period_(period),
-      whole_P_(M_P_) {}
+      whole_{M_P_} {}
 
 void FreeBody::reset(const Vec6& x, const Mat6& M_1, double ahead) noexcept {
   RigidState& s = now_.rigid;
   s = {rotation(Vec3(x.tail<3>())), x.head<3>(), model_.v_IPo_I, model_.w_IP_I};
-  const Mat6 M_P = massInP() + rotated(s.R_IP.transpose(), M_1);
-  whole_P_ = M_P;
-  now_.motion = motionOf(M_P, s, {});
+  whole_ = {massInP() + rotated(s.R_IP.transpose(), M_1)};
+  now_.motion = motionOf(whole_, s, {});
   now_.time = ahead > 0.0 ? -ahead : 0.0;
   along_.setZero();
   now_.pulses = {};
-  if (ahead > 0.0 && !velocity(s).isZero(0.0)) s = advanced(M_P, M_P, s, {}, -ahead);
+  if (ahead > 0.0 && !velocity(s).isZero(0.0)) s = advanced(whole_, whole_, s, {}, -ahead);
 }
 
 void FreeBody::step(const Wrench& F_Po_I, double damping) noexcept {
@@ -133,10 +133,11 @@ void FreeBody::step(const Wrench& F_Po_I, const CarriedBody& carried, double dt,
   before_ = now_;
   dt_ = dt;
   const RigidState& from = before_.rigid;
-  const Mat6 own = massInP(),
-             before = own + rotated(carried.R_IP_before.transpose(), carried.before),
-             after = own + rotated(carried.R_IP.transpose(), carried.M_1),
-             middle = rotated(from.R_IP, 0.5 * (before + after));
+  const Mat6 own = massInP();
+  const Gyrostat before{own + rotated(carried.R_IP_before.transpose(), carried.before),
+                        wheels(now_.time)};
+  Gyrostat after{own + rotated(carried.R_IP.transpose(), carried.M_1), wheels(now_.time)};
+  const Mat6 middle = rotated(from.R_IP, 0.5 * (before.M_P + after.M_P));
   mobility_ = Lu6(middle).inverse();
   damping_ = -damping * (middle * (velocity(from) - along_));
   Wrench F = Wrench::from(F_Po_I.stacked() + damping_), F_ahead = F;
@@ -150,18 +151,25 @@ void FreeBody::step(const Wrench& F_Po_I, const CarriedBody& carried, double dt,
                     thrust(jets, now_.pulses, t, over));
     };
     const Wrench pushed = thrust_I(now_.time, dt, 0.5 * dt);
-    pushed_ = pushed.stacked();
     F = F + pushed;
     now_.pulses = spent(now_.pulses, dt);
     now_.time += dt;
+    after.h_P = wheels(now_.time);
+    pushed_ = pushed.stacked();
+    if (dt > 0.0) pushed_.tail<3>() -= from.R_IP * (after.h_P - before.h_P) / dt;
     F_ahead = F_ahead + thrust_I(now_.time, ahead, dt + 0.5 * ahead);
   }
   const RigidState s = advanced(before, after, from, F, dt);
   way_ << s.p - from.p, rotationVector(s.R_IP * from.R_IP.transpose());
   now_.rigid = s;
-  whole_P_ = after;
+  whole_ = after;
   if (!(ahead > 0.0)) F_ahead = F;
-  now_.motion = motionOf(after, advanced(after, after, s, F_ahead, ahead), F_ahead);
+  const Gyrostat then{after.M_P, wheels(now_.time + ahead)};
+  Wrench shown = F_ahead;
+  const double over = ahead > 0.0 ? ahead : dt;
+  if (over > 0.0)
+    shown.n -= s.R_IP * ((ahead > 0.0 ? then.h_P - after.h_P : after.h_P - before.h_P) / over);
+  now_.motion = motionOf(then, advanced(after, then, s, F_ahead, ahead), shown);
   if (damped() < 0.0) {
     now_ = before_;
     step(F_Po_I, carried, dt, ahead, 0.0);
@@ -170,7 +178,7 @@ void FreeBody::step(const Wrench& F_Po_I, const CarriedBody& carried, double dt,
 
 BodyMotion FreeBody::coasting() const noexcept {
   const BodyMotion& m = now_.motion;
-  return motionOf(whole_P_, {m.X.R, m.X.p, m.v, m.w}, {});
+  return motionOf(whole_, {m.X.R, m.X.p, m.v, m.w}, {});
 }
 
 BodyMotion FreeBody::atWrench() const noexcept {

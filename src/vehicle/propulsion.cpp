@@ -5,6 +5,24 @@
 
 namespace ves {
 
+double ReactionWheel::momentum(double t) const noexcept {
+  double taken = 0.0;
+  for (int i = 0; i < size; ++i) {
+    const WheelTorque& one = torques[static_cast<std::size_t>(i)];
+    taken -= one.torque * std::clamp(t - one.on.from, 0.0, one.on.until - one.on.from);
+  }
+  return taken;
+}
+
+Vec3 wheelMomentum(const Propulsion& propulsion, double t) noexcept {
+  Vec3 sum = Vec3::Zero();
+  for (int i = 0; i < propulsion.wheel_count; ++i) {
+    const ReactionWheel& wheel = propulsion.wheels[static_cast<std::size_t>(i)];
+    sum += wheel.momentum(t) * wheel.axis_P;
+  }
+  return sum;
+}
+
 Pulses pulsesOf(const AttitudeHold& hold, const Pulses& before, const Vec3& turn,
                 const Vec3& w) noexcept {
   Pulses out = before;

@@ -38,12 +38,17 @@ struct RigidState {
   Vec3 w = Vec3::Zero();  // [rad/s]
 };
 
-/// Over dt [s], which may be negative, under a held wrench, about Po in I: a body whose spatial
-/// mass about Po in P goes evenly from M_P to M_then_P, of one mass. The attitude by Runge and
-/// Kutta's steps of fourth order in the rotation vector, of at most 5 mrad each. The momentum that
-/// the wrench leaves is kept: to rounding where the shape stays, else as far as a step's change of
-/// it is even.
-RigidState advanced(const Mat6& M_P, const Mat6& M_then_P, const RigidState& from,
+/// A body of one mass, which may change its shape and has wheels.
+struct Gyrostat {
+  Mat6 M_P;                 // spatial mass about Po in P
+  Vec3 h_P = Vec3::Zero();  // [N m s] of what turns in it
+};
+
+/// Over dt [s], which may be negative, under a held wrench, about Po in I: a body that goes evenly
+/// from one to the other. The attitude by Runge and Kutta's steps of fourth order in the rotation
+/// vector, of at most 5 mrad each. The momentum that the wrench leaves is kept: to rounding where
+/// the shape stays, else as far as a step's change of it is even.
+RigidState advanced(const Gyrostat& body, const Gyrostat& then, const RigidState& from,
                     const Wrench& F_Po_I, double dt) noexcept;
 
 /// Steps it. The members are ModalVehicle's.
@@ -101,6 +106,7 @@ class FreeBody {
 
   Vec6 way() const noexcept { return way_ - dt_ * along_; }
   Mat6 massInP() const noexcept { return factors_.mass * M_P_; }
+  Vec3 wheels(double t) const noexcept { return wheelMomentum(model_.propulsion, t); }
 
   FreeBodyModel model_;
   Mat6 M_P_;  // about Po in P
@@ -108,7 +114,7 @@ class FreeBody {
   double period_;  // [s]
   VehicleFactors factors_;
   double dt_ = 0.0;  // [s] of the last step
-  Mat6 whole_P_;     // with the robot, about Po in P
+  Gyrostat whole_;   // with the robot
   State now_, before_;
   Vec6 way_ = Vec6::Zero();       // [m, rad] of the last step, in I
   Vec6 along_ = Vec6::Zero();     // [m/s, rad/s] that energies and damping count from

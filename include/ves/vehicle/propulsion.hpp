@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// What a body that floats pushes itself with: thrusters that fire by a schedule, and couples of
-// them that hold its attitude within a dead band. Beyond the report.
+// What a body that floats pushes itself with: thrusters that fire by a schedule, couples of them
+// that hold its attitude within a dead band, and reaction wheels. Beyond the report.
 #pragma once
 
 #include <array>
@@ -39,12 +39,38 @@ struct AttitudeHold {
   bool operator==(const AttitudeHold&) const = default;
 };
 
+/// A torque on the vehicle about a wheel's axis, as long as a firing.
+struct WheelTorque {
+  Firing on;
+  double torque = 0.0;  // [N m]
+
+  bool operator==(const WheelTorque&) const = default;
+};
+
+/// A reaction wheel, which stands still beside the vehicle when that is let go, and takes what it
+/// gives: the momentum of both stays. Its mass and inertia are the vehicle's.
+struct ReactionWheel {
+  static constexpr int kMost = 4;          // [-] of a body
+  static constexpr int kMostTorques = 32;  // [-] of each
+
+  Vec3 axis_P = Vec3::UnitZ();  // [-] of length one
+  std::array<WheelTorque, kMostTorques> torques{};
+  int size = 0;  // [-] of them
+
+  /// [N m s] that it has taken by t [s].
+  double momentum(double t) const noexcept;
+
+  bool operator==(const ReactionWheel&) const = default;
+};
+
 struct Propulsion {
   std::array<Thruster, Thruster::kMost> thrusters{};
   int size = 0;  // [-] of them
   AttitudeHold hold;
+  std::array<ReactionWheel, ReactionWheel::kMost> wheels{};
+  int wheel_count = 0;  // [-] of them
 
-  bool any() const noexcept { return size > 0 || hold.dead_band > 0.0; }
+  bool any() const noexcept { return size > 0 || hold.dead_band > 0.0 || wheel_count > 0; }
   bool operator==(const Propulsion&) const = default;
 };
 
@@ -62,5 +88,8 @@ Pulses spent(const Pulses& pulses, double dt) noexcept;
 
 /// The mean of what fires from t on over dt [s], about Po in P.
 Wrench thrust(const Propulsion& propulsion, const Pulses& pulses, double t, double dt) noexcept;
+
+/// [N m s] of the wheels beside the body at t [s], in P.
+Vec3 wheelMomentum(const Propulsion& propulsion, double t) noexcept;
 
 }  // namespace ves
