@@ -5,7 +5,9 @@
 
 #include <random>
 
+#include "support/orbit.hpp"
 #include "ves/contact/contact_watch.hpp"
+#include "ves/vehicle/free_body.hpp"
 
 namespace ves {
 namespace {
@@ -268,6 +270,37 @@ TEST(Contact, WhatFloatsFreelyKeepsItsBooks) {
   for (int k = 0; k < 100; ++k) advance(e, nowhere, nowhere, 0.0, 1e-2, 1e-3, falling, watch);
   EXPECT_NEAR(falling.v.z(), start.v.z() - 9.81, 1e-9);
   EXPECT_NEAR(falling.p.z(), start.p.z() + start.v.z() - 0.5 * 9.81, 1e-9);
+}
+
+// In an orbit it goes as Clohessy and Wiltshire have it, and turns as a vehicle of its inertia
+// does.
+TEST(Contact, WhatFloatsGoesRoundTheEarth) {
+  Environment e = drifting({1e4, 1.0, 0.0, 0.0, 1e-3}, 40.0, 0.0);
+  e.tool.clear();
+  e.target->I_Bcm_B = Vec3(2.0, 3.0, 5.0).asDiagonal();
+  e.orbit.rate = 0.2;
+  e.p_IO_I = {0.1, 0.2, 1.3};
+  const Vec3 r(0.3, -0.2, 0.1), v(0.05, -0.02, 0.03);
+  Floating body = e.target->start;
+  body.q.setIdentity();
+  body.p = e.p_IO_I + r;
+  body.v = v;
+  body.w = {0.1, 0.2, -0.05};
+  FreeBodyModel model;
+  model.body_P = {40.0, Vec3::Zero(), e.target->I_Bcm_B};
+  model.orbit = e.orbit;
+  model.w_IP_I = body.w;
+  FreeBody vehicle(model, 0.01);
+  vehicle.reset(Vec6::Zero());
+  const FrameMotion nowhere;
+  ContactWatch watch;
+  for (int k = 1; k <= 1000; ++k) {
+    advance(e, nowhere, nowhere, 0.0, 1e-2, 1e-3, body, watch);
+    vehicle.step(Wrench{});
+    const Vec3 should = test::inOrbit(e.orbit.rate, r, v, 0.01 * k);
+    ASSERT_LT((body.p - e.p_IO_I - should).norm(), 1e-9) << k;
+    ASSERT_LT((body.q.toRotationMatrix() - vehicle.state().R_IP).norm(), 1e-8) << k;
+  }
 }
 
 // The mean wrench times the time is the change of momentum: what the sensor is given is the

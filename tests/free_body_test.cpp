@@ -9,6 +9,7 @@
 #include <random>
 
 #include "support/momentum.hpp"
+#include "support/orbit.hpp"
 #include "support/rig.hpp"
 #include "ves/evaluation/summary.hpp"
 #include "ves/kinematics/stewart.hpp"
@@ -580,6 +581,71 @@ TEST(ReactionWheels, TurnAVehicleUnderARobotAsTheTruthDoes) {
   EXPECT_GT(of("emulation_travel_rad"), 0.1);
   EXPECT_LT(of("emulation_error_rms_rad"), 2e-3 * of("emulation_travel_rad"));
   EXPECT_LT(of("emulation_error_rms_m"), 2e-3 * of("emulation_travel_m"));
+}
+
+// --- In an orbit ---------------------------------------------------------------------------------
+
+TEST(Orbit, WhatFloatsMovesAsClohessyAndWiltshireHaveIt) {
+  // A quarter of a low orbit, and most of one whose rate is a hundred times that; the attitude does
+  // not matter to the centre of mass.
+  for (const double n : {0.0011, 0.11}) {
+    FreeBodyModel vehicle = asymmetric({0.0, 0.0, 0.0});
+    vehicle.orbit.rate = n;
+    vehicle.v_IPo_I = {0.02, -0.03, 0.01};
+    vehicle.w_IP_I = {0.01, 0.02, -0.01};
+    const BothWays both(vehicle, n < 0.01 ? 1400.0 : 50.0);
+    for (const auto* x : {&both.model, &both.truth})
+      for (std::size_t k = 0; k < x->size(); k += 50) {
+        const double t = static_cast<double>(k) * kTick;
+        const Vec3 should = test::inOrbit(n, Vec3::Zero(), vehicle.v_IPo_I, t);
+        EXPECT_LT(((*x)[k].head<3>() - should).norm(), 1e-9 * (1.0 + should.norm())) << t;
+      }
+  }
+}
+
+TEST(Orbit, ABodySwingsAboutTheEarthsDirection) {
+  // Small pitch: I_z th'' = -3 n^2 (I_y - I_x) th, in axes that go round.
+  FreeBodyModel vehicle;
+  vehicle.body_P = {80.0, Vec3::Zero(), Vec3(10.0, 22.0, 25.0).asDiagonal()};
+  const double n = vehicle.orbit.rate = 0.1, first = 1e-5,
+               rate = n * std::sqrt(3.0 * (22.0 - 10.0) / 25.0);
+  vehicle.w_IP_I.z() = first;
+  const BothWays both(vehicle, 100.0);
+  for (const auto* x : {&both.model, &both.truth})
+    for (std::size_t k = 0; k < x->size(); k += 10) {
+      const double t = static_cast<double>(k) * kTick;
+      const Vec3 th = (*x)[k].tail<3>();
+      EXPECT_LT((th - Vec3(0.0, 0.0, first / rate * std::sin(rate * t))).norm(), 1e-10) << t;
+    }
+}
+
+TEST(Orbit, ASatelliteUnderARobotGoesAsTheTruthDoes) {
+  // The robot's joints have momentum while the axes turn. A hundred low orbits' rate shows it.
+  const RecordedRun run = recordLockstep(test::experiment(
+      "satellite_puma", {"sensor.noise=false", "base.free.orbital_rate_deg_per_s=1"}));
+  ASSERT_TRUE(run.result.good());
+  const auto summary = summarise(run.series, run.result);
+  const auto of = [&](const char* key) { return summary[key].get<double>(); };
+  EXPECT_LT(of("emulation_error_rms_rad"), 2e-3 * of("emulation_travel_rad"));
+  EXPECT_LT(of("emulation_error_rms_m"), 2e-3 * of("emulation_travel_m"));
+}
+
+TEST(Orbit, KeepsTheBook) {
+  FreeBodyModel vehicle = asymmetric({0.1, 0.0, -0.5});
+  vehicle.orbit.rate = 0.05;
+  vehicle.v_IPo_I = {0.05, -0.03, 0.04};
+  vehicle.w_IP_I = {0.02, 0.03, -0.04};
+  FreeBody body(vehicle, kTick);
+  body.reset(Vec6::Zero());
+  const double first = body.energy();
+  double put_in = 0.0, most = 0.0;
+  for (int k = 0; k < 4000; ++k) {
+    body.step(Wrench{});
+    put_in += body.shaken();
+    most = std::max(most, std::abs(put_in));
+    ASSERT_NEAR(body.energy() - first, put_in, 5e-3 * most + 1e-9) << k;
+  }
+  EXPECT_GT(most, 1e-2);
 }
 
 TEST(Thrusters, KeepTheModelWhereTheyKeepTheTruth) {

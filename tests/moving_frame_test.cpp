@@ -298,6 +298,27 @@ TEST(Flight, WhatIsHeldStopsWithTheLaboratory) {
   }
 }
 
+TEST(Flight, WhatFloatsIsWhereItWasForAnotherController) {
+  // One leaves a laboratory that has flown and turned, and the next counts from another place.
+  const Experiment e = test::experiment("servicer_capture");
+  plant::Plant plant(e.plant);
+  LegCommand command;
+  const auto beside = [&]() -> std::array<Vec3, 4> {  // p, an axis, v, w in the laboratory
+    const Transform X_HE = inverse(command.laboratory.E_H.X);
+    const Floating& ball = plant.truth().target;
+    return {X_HE * Vec3(ball.p - e.plant.geometry.home()), X_HE.R * (ball.q * Vec3(Vec3::UnitX())),
+            X_HE.R * ball.v, X_HE.R * ball.w};
+  };
+  const std::array<Vec3, 4> first = beside();
+  for (const Vec3& turn : {Vec3(0.3, -2.0, 1.0), Vec3(Vec3::Zero()), Vec3(1.0, 0.0, 0.0)}) {
+    command.laboratory.time = 1;
+    command.laboratory.E_H.X = {rotationOf(turn), 1000.0 * turn};
+    plant.command(command);
+    for (std::size_t k = 0; k < first.size(); ++k)
+      EXPECT_LT((beside()[k] - first[k]).norm(), 1e-11) << k;
+  }
+}
+
 TEST(Flight, TheLaboratoryRestsWhereNothingIsEmulated) {
   const RecordedRun run = recordLockstep(test::experiment(
       "satellite_tumbling",

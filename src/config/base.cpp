@@ -286,6 +286,8 @@ Base readFree(Section& s) {
     free.v_IPo_I = section.vector("velocity_m_per_s", 3, -1e4, 1e4);
   if (section.has("rate_deg_per_s"))
     free.w_IP_I = kDegree * section.vector("rate_deg_per_s", 3, -90.0, 90.0);
+  if (section.has("orbital_rate_deg_per_s"))
+    free.orbit.rate = kDegree * section.number("orbital_rate_deg_per_s", 0.0, 1.0);
   if (section.has("thrusters"))
     for (Section one : section.list("thrusters")) {
       if (free.propulsion.size == Thruster::kMost)

@@ -94,6 +94,10 @@ World readEnvironment(Section s, const Experiment& e) {
   const Vec3 tool_I = (e.plant.geometry.fromHome({}) * payload.X_PL0() * X_L0T).p;
   Environment& environment = world.environment;
   environment.gravity = e.plant.gravity;
+  if (const auto* free = std::get_if<FreeBodyModel>(&e.controller.vehicle.kind)) {
+    environment.orbit = free->orbit;
+    environment.p_IO_I = e.plant.geometry.home();
+  }
   environment.law = readLaw(s.section("contact"));
   for (Section one : s.list("tool")) {
     Feeler feeler;

@@ -151,9 +151,13 @@ FloatingRates rates(const Environment& environment, const Floating& target,
   out.v = out.w = Vec3::Zero();
   if (!environment.target) return out;
   const Target& body = *environment.target;
-  out.v = on_target_Bo_I.f / body.mass + environment.gravity;
+  const Orbit& orbit = environment.orbit;
+  out.v = on_target_Bo_I.f / body.mass + environment.gravity +
+          orbit.acceleration(target.p - environment.p_IO_I, target.v);
   const Mat3 R = target.q.toRotationMatrix(), I_I = R * body.I_Bcm_B * R.transpose();
-  out.w = I_I.inverse() * (on_target_Bo_I.n - target.w.cross(I_I * target.w));
+  const Vec3 w = target.w + orbit.w();
+  out.w = I_I.inverse() * (on_target_Bo_I.n + orbit.gradient(I_I) - w.cross(I_I * w)) +
+          target.w.cross(orbit.w());
   return out;
 }
 

@@ -106,8 +106,9 @@ Waypoint<6> TestPlatform::nextMotion(const Wrenches& W) noexcept {
             : filter_.noise(wrenchNoise(config_.sensor, bias_.noise(), W.emulated.R_EP));
     const Wrench at_port = W.emulated.flies ? rotate(W.emulated.R_EI.transpose(), W.felt) : W.felt;
     return motion_.admittanceModel(
-        {W.dynamic, at_port, noise, robot_.carried(), share_.value(), samples_.wrench(),
-         !aided_.withholds(), aided_.lesson(), sample.q, commander_.legs().L, X_IP, legs_.servo()},
+        {W.dynamic, at_port, noise, robot_.carried(joints_.emulatedMomentum()), share_.value(),
+         samples_.wrench(), !aided_.withholds(), aided_.lesson(), sample.q, commander_.legs().L,
+         X_IP, legs_.servo()},
         safety_.path());
   }
   if (supervisor_.moves()) return motion_.trajectoryGeneration();

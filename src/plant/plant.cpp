@@ -104,16 +104,20 @@ void Plant::command(const LegCommand& command) noexcept {
   planRobotEvent();
 }
 
-/// Where the laboratory stops, what floats stops with it, and keeps what it did beside it.
+/// Where the laboratory stops, what floats stops with it, and keeps what it did beside it. Where it
+/// rests and is elsewhere at once, another controller counts from elsewhere, and nothing has moved.
 void Plant::fly(const Laboratory& laboratory) noexcept {
-  const BodyMotion before = laboratory_.at(now_);
-  const bool flew = laboratory_.flies() && !(before.v.isZero(0.0) && before.w.isZero(0.0)),
-             rests = laboratory.E_H.v.isZero(0.0) && laboratory.E_H.w.isZero(0.0);
+  const auto rests = [](const BodyMotion& H) { return H.v.isZero(0.0) && H.w.isZero(0.0); };
+  const BodyMotion before = laboratory_.at(now_), after = laboratory.at(now_);
   laboratory_ = laboratory;
-  if (!flew || !rests || !config_.task.world) return;
+  if (!rests(after) || (rests(before) && before.X == after.X) || !config_.task.world) return;
   Floating& target = truth_.target;
-  target.v -= before.v + before.w.cross(target.X_IB().p - config_.geometry.home() - before.X.p);
-  target.w -= before.w;
+  const Vec3 home = config_.geometry.home(), p = target.p - home;
+  const Transform moved = rests(before) ? after.X * inverse(before.X) : Transform();
+  target.v = moved.R * (target.v - before.v - before.w.cross(p - before.X.p));
+  target.w = moved.R * (target.w - before.w);
+  target.p = home + moved * p;
+  target.q = (Eigen::Quaterniond(moved.R) * target.q).normalized();
   tool_ = toolMotion();
 }
 

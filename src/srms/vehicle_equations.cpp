@@ -166,9 +166,10 @@ VectorXd FreeBodyEquations::start(const RidingRobot& robot) const {
 
 /// Whatever the robot carries.
 VectorXd FreeBodyEquations::stateOf(const RidingRobot& robot, const BodyMotion& P) const {
-  const Vec3 p = P.X.p - p_IH_;
-  Vec6 momentum = massOf(model_.body_P, robot, P.X.R) * (Vec6() << P.v, P.w).finished() +
-                  momentumOfJoints(robot, P.X.R);
+  const Vec3 p = P.X.p - p_IH_, w = model_.orbit.w();
+  Vec6 momentum =
+      massOf(model_.body_P, robot, P.X.R) * (Vec6() << P.v + w.cross(p), P.w + w).finished() +
+      momentumOfJoints(robot, P.X.R);
   momentum.tail<3>() += P.X.R * wheelMomentum(model_.propulsion, robot.t);
   momentum.tail<3>() += p.cross(momentum.head<3>());  // about home
   VectorXd y(kStates);
@@ -185,8 +186,9 @@ BodyMotion FreeBodyEquations::platform(const RidingRobot& robot, const VectorXd&
   momentum -= momentumOfJoints(robot, P.X.R);
   momentum.tail<3>() -= P.X.R * wheelMomentum(model_.propulsion, robot.t);
   const Vec6 V = massOf(model_.body_P, robot, P.X.R).llt().solve(momentum);
-  P.v = V.head<3>();
-  P.w = V.tail<3>();
+  const Vec3 w = model_.orbit.w();
+  P.v = V.head<3>() - w.cross(p);
+  P.w = V.tail<3>() - w;
   return P;
 }
 
@@ -208,7 +210,19 @@ void FreeBodyEquations::derivative(const RidingRobot& robot, const VectorXd& y,
   dy.head<3>() = P.v;
   const Eigen::Quaterniond turn(0.0, 0.5 * P.w.x(), 0.5 * P.w.y(), 0.5 * P.w.z());
   dy.segment<4>(kAttitude) = (turn * attitude(y)).coeffs();
-  dy.segment<6>(kMomentum) << F_Po_I.f / mass_, (F_Po_I.n + p.cross(F_Po_I.f)) / mass_;
+  Vec6 rate;
+  rate << F_Po_I.f, F_Po_I.n + p.cross(F_Po_I.f);
+  if (const Orbit& orbit = model_.orbit; orbit.rate != 0.0) {
+    // The axes turn under the momentum, and what is not at the origin is pulled elsewhere.
+    const RigidBody all = rotated(P.X.R, combine(model_.body_P, robot.X_PL0, robot.composite_L0));
+    const Vec3 c = p + all.p_BoBcm_B, w = orbit.w(),
+               pull = all.mass * orbit.rate * orbit.rate * Vec3(2.0 * c.x(), -c.y(), -c.z()),
+               linear = mass_ * y.segment<3>(kMomentum),
+               angular = mass_ * y.segment<3>(kMomentum + 3);
+    rate.head<3>() += pull - w.cross(linear);
+    rate.tail<3>() += c.cross(pull) + orbit.gradient(all.I_Bcm_B) - w.cross(angular);
+  }
+  dy.segment<6>(kMomentum) = rate / mass_;
 }
 
 void FreeBodyEquations::tell(const RidingRobot& robot, const VectorXd& y,

@@ -32,12 +32,17 @@ Vec3 rotationRate(const Vec3& th, const Vec3& w) noexcept {
 Vec6 velocity(const RigidState& s) noexcept { return (Vec6() << s.v, s.w).finished(); }
 
 /// The same with the acceleration under F.
-BodyMotion motionOf(const Gyrostat& whole, const RigidState& s, const Wrench& F_Po_I) noexcept {
+BodyMotion motionOf(const Gyrostat& whole, const RigidState& s, const Wrench& F_Po_I,
+                    const Orbit& orbit) noexcept {
   const Lumped body(whole.M_P);
   const Vec3 c = s.R_IP * body.center, h = s.R_IP * whole.h_P;
   const Mat3 J = s.R_IP * body.inertia * s.R_IP.transpose();
-  const Vec3 alpha = J.inverse() * (F_Po_I.n - c.cross(F_Po_I.f) - s.w.cross(J * s.w + h));
-  const Vec3 a = F_Po_I.f / body.mass - alpha.cross(c) - s.w.cross(s.w.cross(c));
+  const Vec3 W = orbit.w(), w = s.w + W;
+  const Vec3 alpha =
+      J.inverse() * (F_Po_I.n - c.cross(F_Po_I.f) + orbit.gradient(J) - w.cross(J * w + h)) +
+      s.w.cross(W);
+  const Vec3 a = F_Po_I.f / body.mass + orbit.acceleration(s.p + c, s.v + s.w.cross(c)) -
+                 alpha.cross(c) - s.w.cross(s.w.cross(c));
   return {{s.R_IP, s.p}, s.v, s.w, a, alpha};
 }
 
@@ -53,15 +58,16 @@ ModalModel linearised(const FreeBodyModel& model) {
 }
 
 RigidState advanced(const Gyrostat& body, const Gyrostat& then, const RigidState& from,
-                    const Wrench& F, double dt) noexcept {
+                    const Wrench& F, double dt, const Orbit& orbit,
+                    const Vec3& h_joints_I) noexcept {
   constexpr double kMostTurn = 0.005;  // [rad] in a step
   constexpr double kMostSteps = 1e3;   // [-] a turn as fast as that is no vehicle's
   if (dt == 0.0) return from;
   const Lumped at_first(body.M_P), at_last(then.M_P);
   const Vec3 c_first = from.R_IP * at_first.center, shift_P = at_last.center - at_first.center;
   const Mat3 reshape = at_last.inertia - at_first.inertia;
-  const Vec3 v_c = from.v + from.w.cross(c_first), a_c = F.f / at_last.mass;
-  Vec3 L = from.R_IP * (at_first.inertia * (from.R_IP.transpose() * from.w) + body.h_P);
+  const Vec3 a_c = F.f / at_last.mass, W = orbit.w();
+  Vec3 L = from.R_IP * (at_first.inertia * (from.R_IP.transpose() * (from.w + W)) + body.h_P);
 
   const double turn =
       std::abs(dt) * (from.w.norm() + std::abs(dt) * (F.n - c_first.cross(F.f)).norm() *
@@ -69,40 +75,48 @@ RigidState advanced(const Gyrostat& body, const Gyrostat& then, const RigidState
   const int steps = static_cast<int>(std::min(kMostSteps, 1.0 + turn / kMostTurn));
   const double h = dt / steps;
   RigidState to = from;
-  Vec3 shifted = Vec3::Zero();  // [m] what the robot has moved the centre by, in I
+  Vec3 p_c = from.p + c_first, v_c = from.v + from.w.cross(c_first);  // but for the joints' part
   for (int i = 0; i < steps; ++i) {
     struct Rates {
-      Vec3 th, L, shifted;
+      Vec3 th, L, p, v;
     };
     // (J_c w)' = n - c x f + (w x c) x m c_rel', where m c_rel' is the linear momentum of the
     // joints, which shows in how they move the centre: with f and n of their momentum h, J_c w +
     // h_c stays.
-    const auto rates = [&](double part, const Vec3& th, const Vec3& momentum) -> Rates {
+    const auto rates = [&](double part, const Vec3& th, const Vec3& momentum, const Vec3& p,
+                           const Vec3& v) -> Rates {
       const double share = (i + part) / steps;
-      const Mat3 R = rotationOf(th) * to.R_IP;
-      const Mat3 mobility = (at_first.inertia + share * reshape).inverse();
+      const Mat3 R = rotationOf(th) * to.R_IP, J_P = at_first.inertia + share * reshape;
       const Vec3 h_P = body.h_P + share * (then.h_P - body.h_P);
-      const Vec3 w = R * (mobility * (R.transpose() * momentum - h_P)),
+      const Vec3 w = R * (J_P.inverse() * (R.transpose() * momentum - h_P)) - W,
                  c = R * (at_first.center + share * shift_P), c_dot = R * shift_P / dt;
-      return {rotationRate(th, w), F.n - c.cross(F.f) + at_last.mass * w.cross(c).cross(c_dot),
-              c_dot};
+      Rates out = {rotationRate(th, w), F.n - c.cross(F.f) + at_last.mass * w.cross(c).cross(c_dot),
+                   v + c_dot, a_c};
+      if (orbit.rate != 0.0) {
+        out.L += orbit.gradient(R * J_P * R.transpose()) - W.cross(momentum + h_joints_I);
+        out.v += orbit.acceleration(p, out.p);
+      }
+      return out;
     };
-    const Rates k1 = rates(0.0, Vec3::Zero(), L),
-                k2 = rates(0.5, 0.5 * h * k1.th, L + 0.5 * h * k1.L),
-                k3 = rates(0.5, 0.5 * h * k2.th, L + 0.5 * h * k2.L),
-                k4 = rates(1.0, h * k3.th, L + h * k3.L);
-    const auto mean = [h](const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) -> Vec3 {
-      return h / 6.0 * (a + 2.0 * b + 2.0 * c + d);
+    const auto on = [&](double part, const Rates& k) {
+      return rates(part, part * h * k.th, L + part * h * k.L, p_c + part * h * k.p,
+                   v_c + part * h * k.v);
     };
-    L += mean(k1.L, k2.L, k3.L, k4.L);
-    shifted += mean(k1.shifted, k2.shifted, k3.shifted, k4.shifted);
-    to.R_IP = rotationOf(mean(k1.th, k2.th, k3.th, k4.th)) * to.R_IP;
+    const Rates k1 = rates(0.0, Vec3::Zero(), L, p_c, v_c), k2 = on(0.5, k1), k3 = on(0.5, k2),
+                k4 = on(1.0, k3);
+    const auto mean = [&](Vec3 Rates::*of) -> Vec3 {
+      return h / 6.0 * (k1.*of + 2.0 * k2.*of + 2.0 * k3.*of + k4.*of);
+    };
+    L += mean(&Rates::L);
+    p_c += mean(&Rates::p);
+    v_c += mean(&Rates::v);
+    to.R_IP = rotationOf(mean(&Rates::th)) * to.R_IP;
   }
   to.R_IP = orthogonal(to.R_IP);
   const Vec3 c_last = to.R_IP * at_last.center;
-  to.w = to.R_IP * (at_last.inertia.inverse() * (to.R_IP.transpose() * L - then.h_P));
-  to.v = v_c + dt * a_c - to.w.cross(c_last);
-  to.p = from.p + dt * (v_c + 0.5 * dt * a_c) + shifted - (c_last - c_first);
+  to.w = to.R_IP * (at_last.inertia.inverse() * (to.R_IP.transpose() * L - then.h_P)) - W;
+  to.v = v_c - to.w.cross(c_last);
+  to.p = p_c - c_last;
   return to;
 }
 
@@ -117,11 +131,12 @@ void FreeBody::reset(const Vec6& x, const Mat6& M_1, double ahead) noexcept {
   RigidState& s = now_.rigid;
   s = {rotation(Vec3(x.tail<3>())), x.head<3>(), model_.v_IPo_I, model_.w_IP_I};
   whole_ = {massInP() + rotated(s.R_IP.transpose(), M_1)};
-  now_.motion = motionOf(whole_, s, {});
+  now_.motion = motionOf(whole_, s, {}, model_.orbit);
   now_.time = ahead > 0.0 ? -ahead : 0.0;
   along_.setZero();
   now_.pulses = {};
-  if (ahead > 0.0 && !velocity(s).isZero(0.0)) s = advanced(whole_, whole_, s, {}, -ahead);
+  if (ahead > 0.0 && !(velocity(s).isZero(0.0) && model_.orbit.rate == 0.0))
+    s = advanced(whole_, whole_, s, {}, -ahead, model_.orbit);
 }
 
 void FreeBody::step(const Wrench& F_Po_I, double damping) noexcept {
@@ -141,6 +156,7 @@ void FreeBody::step(const Wrench& F_Po_I, const CarriedBody& carried, double dt,
   mobility_ = Lu6(middle).inverse();
   damping_ = -damping * (middle * (velocity(from) - along_));
   Wrench F = Wrench::from(F_Po_I.stacked() + damping_), F_ahead = F;
+  pushed_.setZero();
   const Propulsion& jets = model_.propulsion;
   if (jets.any()) {
     const Mat3 R_PI = from.R_IP.transpose();
@@ -159,7 +175,17 @@ void FreeBody::step(const Wrench& F_Po_I, const CarriedBody& carried, double dt,
     if (dt > 0.0) pushed_.tail<3>() -= from.R_IP * (after.h_P - before.h_P) / dt;
     F_ahead = F_ahead + thrust_I(now_.time, ahead, dt + 0.5 * ahead);
   }
-  const RigidState s = advanced(before, after, from, F, dt);
+  const Orbit& orbit = model_.orbit;
+  if (orbit.rate != 0.0) {  // what it puts into the vehicle alone
+    const Gyrostat alone{own, before.h_P};
+    const BodyMotion with = motionOf(alone, from, {}, orbit),
+                     without = motionOf(alone, from, {}, {});
+    pushed_ += rotated(from.R_IP, own) *
+               (Vec6() << with.a - without.a, with.alpha - without.alpha).finished();
+  }
+  const Vec3 c = from.R_IP * Lumped(before.M_P).center,
+             h_joints = carried.joints.tail<3>() - c.cross(carried.joints.head<3>());
+  const RigidState s = advanced(before, after, from, F, dt, orbit, h_joints);
   way_ << s.p - from.p, rotationVector(s.R_IP * from.R_IP.transpose());
   now_.rigid = s;
   whole_ = after;
@@ -169,7 +195,7 @@ void FreeBody::step(const Wrench& F_Po_I, const CarriedBody& carried, double dt,
   const double over = ahead > 0.0 ? ahead : dt;
   if (over > 0.0)
     shown.n -= s.R_IP * ((ahead > 0.0 ? then.h_P - after.h_P : after.h_P - before.h_P) / over);
-  now_.motion = motionOf(then, advanced(after, then, s, F_ahead, ahead), shown);
+  now_.motion = motionOf(then, advanced(after, then, s, F_ahead, ahead, orbit), shown, orbit);
   if (damped() < 0.0) {
     now_ = before_;
     step(F_Po_I, carried, dt, ahead, 0.0);
@@ -178,7 +204,7 @@ void FreeBody::step(const Wrench& F_Po_I, const CarriedBody& carried, double dt,
 
 BodyMotion FreeBody::coasting() const noexcept {
   const BodyMotion& m = now_.motion;
-  return motionOf(whole_, {m.X.R, m.X.p, m.v, m.w}, {});
+  return motionOf(whole_, {m.X.R, m.X.p, m.v, m.w}, {}, model_.orbit);
 }
 
 BodyMotion FreeBody::atWrench() const noexcept {

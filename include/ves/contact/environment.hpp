@@ -9,6 +9,7 @@
 
 #include "ves/contact/law.hpp"
 #include "ves/contact/shape.hpp"
+#include "ves/math/orbit.hpp"
 #include "ves/robot/robot_model.hpp"
 
 namespace ves {
@@ -67,6 +68,8 @@ struct Environment {
   std::optional<Target> target;
   std::optional<Grip> grip;
   Vec3 gravity = Vec3::Zero();  // [m/s^2] g_I, on the target
+  Orbit orbit;                  // that it goes round with,
+  Vec3 p_IO_I = Vec3::Zero();   // [m] and the origin of it
 
   bool operator==(const Environment&) const = default;
 };
@@ -116,8 +119,8 @@ FloatingRates rates(const Environment& environment, const Floating& target,
 bool grasp(const Environment& environment, const FrameMotion& tool, Floating& target) noexcept;
 
 /// Moves the target over dt [s] from t [s] on while the tool goes from one motion to the other, in
-/// Runge-Kutta steps, each seen by the watch: of at most `step` [s] where the tool touches something
-/// or may before the end. Returns the mean of what touched.
+/// Runge-Kutta steps, each seen by the watch: of at most `step` [s] where the tool touches
+/// something or may before the end. Returns the mean of what touched.
 Touch advance(const Environment& environment, const FrameMotion& from, const FrameMotion& to,
               double t, double dt, double step, Floating& target, ContactWatch& watch) noexcept;
 

@@ -44,6 +44,7 @@ class JointMomentum {
   /// per second. Its sum over time loses nothing. Zero where only inertia is compensated.
   const Wrench& force() const noexcept { return I_.force; }
   const Wrench& emulatedForce() const noexcept { return E_.force; }  // the same about Po in E
+  const Vec6& emulatedMomentum() const noexcept { return E_.momentum; }
   /// F_Po_I that a platform turning at w_IP_I shows of it in the sensor's mean, beyond what
   /// RobotInertia counts.
   Wrench shown(const Vec3& w_IP_I) const noexcept;

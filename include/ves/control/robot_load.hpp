@@ -97,9 +97,10 @@ class RobotInertia {
   /// Of the composite body about Po in I, times the share. [kg, kg m, kg m^2]
   const Mat6& M_1() const noexcept { return M_1_; }
   /// The same in E and before the newest sample, the share as now, with the attitudes they were
-  /// seen at.
-  CarriedBody carried() const noexcept {
+  /// seen at, and with the joints' momentum.
+  CarriedBody carried(const Vec6& joints) const noexcept {
     CarriedBody out(share_ * E_before_.whole, share_ * E_.whole);
+    out.joints = share_ * joints;
     out.R_IP_before = E_before_.R;
     out.R_IP = E_.R;
     return out;

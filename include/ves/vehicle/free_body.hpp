@@ -11,6 +11,7 @@
 #pragma once
 
 #include "ves/kinematics/stewart.hpp"
+#include "ves/math/orbit.hpp"
 #include "ves/robot/robot_model.hpp"
 #include "ves/vehicle/modal_vehicle.hpp"
 #include "ves/vehicle/propulsion.hpp"
@@ -23,6 +24,7 @@ struct FreeBodyModel {
   Vec3 v_IPo_I = Vec3::Zero();  // [m/s]
   Vec3 w_IP_I = Vec3::Zero();   // [rad/s]
   Propulsion propulsion;
+  Orbit orbit;  // that I goes round with, its origin at home
 
   bool operator==(const FreeBodyModel&) const = default;
 };
@@ -45,11 +47,13 @@ struct Gyrostat {
 };
 
 /// Over dt [s], which may be negative, under a held wrench, about Po in I: a body that goes evenly
-/// from one to the other. The attitude by Runge and Kutta's steps of fourth order in the rotation
+/// from one to the other. By Runge and Kutta's steps of fourth order, the attitude in the rotation
 /// vector, of at most 5 mrad each. The momentum that the wrench leaves is kept: to rounding where
-/// the shape stays, else as far as a step's change of it is even.
+/// the shape stays, else as far as a step's change of it is even. In an orbit h_joints_I, the
+/// joints' angular momentum about the centre of mass, turns with it.
 RigidState advanced(const Gyrostat& body, const Gyrostat& then, const RigidState& from,
-                    const Wrench& F_Po_I, double dt) noexcept;
+                    const Wrench& F_Po_I, double dt, const Orbit& orbit = {},
+                    const Vec3& h_joints_I = Vec3::Zero()) noexcept;
 
 /// Steps it. The members are ModalVehicle's.
 class FreeBody {

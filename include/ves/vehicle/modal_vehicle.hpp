@@ -128,6 +128,7 @@ struct CarriedBody {
   Mat6 M_1;
   // Attitudes of the platform that the two were seen at: how it lies on the vehicle.
   Mat3 R_IP_before = Mat3::Identity(), R_IP = Mat3::Identity();
+  Vec6 joints = Vec6::Zero();  // [N s, N m s] momentum of the robot's joints beside it
 };
 
 /// Steps a modal model by the exact zero-order hold. Coordinates are those of Pose about home.
