@@ -20,6 +20,15 @@ fs::path scenarios() { return fs::path(test::configDir()) / "scenarios"; }
 
 using test::refusal;
 
+TEST(Config, WhatFloatsInTheWorldIsInTheVehiclesOrbit) {
+  const Experiment e =
+      test::experiment("servicer_capture", {"base.free.orbital_rate_deg_per_s=0.5"});
+  const Environment& environment = e.plant.task.world->environment;
+  EXPECT_DOUBLE_EQ(environment.orbit.rate, 0.5 * kDegree);
+  EXPECT_EQ(environment.p_IO_I, e.plant.geometry.home());
+  EXPECT_EQ(std::get<FreeBodyModel>(e.controller.vehicle.kind).orbit, environment.orbit);
+}
+
 TEST(Config, EveryScenarioLoads) {
   int count = 0;
   for (const auto& entry : fs::directory_iterator(scenarios())) {
