@@ -94,6 +94,9 @@ std::vector<std::string> drawSettings(Dice& dice, const Scenario& scenario) {
     put("controller.moving_frame.enabled", flies ? "true" : "false");
     maybe(0.3, "controller.moving_frame.steady_in_contact", "true");
     if (flies) maybe(0.3, "base.free.velocity_m_per_s", "[20, -3, 0]");
+    maybe(0.3, "base.free.orbital_rate_deg_per_s", "0.5");
+    maybe(0.3, "base.free.wheels",
+          "[{axis: [1, 0, 2], most_nms: 20, torques_s_nm: [[1.003, 3, 2], [4, 6, -2]]}]");
   }
   maybe(0.2, "controller.passivity.enabled", "true");
   if (dice.chance(0.3)) {
