@@ -23,6 +23,7 @@
 #include "help.hpp"
 #include "ves/analysis/leaning.hpp"
 #include "ves/config/experiment.hpp"
+#include "ves/core/build.hpp"
 #include "ves/core/spelling.hpp"
 #include "ves/run/run.hpp"
 #include "ves/series/series.hpp"
@@ -99,8 +100,7 @@ inline void catchSignals() {
 inline std::filesystem::path configFolder() {
   if (const char* given = std::getenv("VES_CONFIG_DIR")) return given;
   std::error_code error;
-  const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
-  const auto installed = program.parent_path().parent_path() / "share/ves/config";
+  const auto installed = installedData() / "config";
   const bool here = std::filesystem::exists("config/ves.yaml", error);
   return here || !std::filesystem::exists(installed, error) ? "config" : installed;
 }

@@ -460,6 +460,12 @@ struct BothWays {
   }
 };
 
+/// Of what is accelerated by `rate` from then until then, t after the start.
+double way(double from, double until, double rate, double t) {
+  const double on = std::clamp(t - from, 0.0, until - from);
+  return rate * (0.5 * on * on + on * std::max(0.0, t - until));
+}
+
 TEST(Thrusters, PushAsLongAsTheyFire) {
   // Through the centre of mass, and a couple: half a tick more or less counts as that.
   FreeBodyModel vehicle = asymmetric({0.0, 0.0, -0.5});
@@ -478,10 +484,6 @@ TEST(Thrusters, PushAsLongAsTheyFire) {
     jets.thrusters[k].size = 2;
   }
   const BothWays both(vehicle, 10.0);
-  const auto way = [](double from, double until, double rate, double t) {
-    const double on = std::clamp(t - from, 0.0, until - from);
-    return rate * (0.5 * on * on + on * std::max(0.0, t - until));
-  };
   for (const auto* x : {&both.model, &both.truth})
     for (std::size_t n = 0; n < x->size(); n += 7) {
       const double t = static_cast<double>(n) * kTick;
@@ -537,14 +539,10 @@ TEST(ReactionWheels, TurnABodyThatTumbles) {
   wheel.torques[1] = {{6.0, 7.0}, -10.0};
   wheel.size = 2;
   const BothWays both(vehicle, 20.0);
-  const auto turned = [](double from, double until, double rate, double t) {
-    const double on = std::clamp(t - from, 0.0, until - from);
-    return rate * (0.5 * on * on + on * std::max(0.0, t - until));
-  };
   for (const auto* x : {&both.model, &both.truth})
     for (std::size_t n = 0; n < x->size(); n += 7) {
       const double t = static_cast<double>(n) * kTick,
-                   phi = turned(1.0, 3.0, 0.2, t) + turned(6.0, 7.0, -0.4, t);
+                   phi = way(1.0, 3.0, 0.2, t) + way(6.0, 7.0, -0.4, t);
       const Mat3 R = rotationOf(Vec3(0.3 * t, 0.0, 0.0)) * rotationOf(Vec3(0.0, 0.0, phi));
       EXPECT_LT((rotation(Vec3((*x)[n].tail<3>())) - R).norm(), 1e-8) << t;
     }

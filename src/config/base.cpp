@@ -212,6 +212,18 @@ Base readArmBase(Section& s) {
   return out;
 }
 
+/// From and until, which begin a row of such; the rows are in order.
+Firing firingOf(const Section& s, const char* key, const Eigen::MatrixXd& rows, Eigen::Index i) {
+  const Firing one{rows(i, 0), rows(i, 1)};
+  if (!(one.from >= 0.0 && one.until > one.from) || (i > 0 && !(one.from >= rows(i - 1, 1)))) {
+    const Eigen::VectorXd row = rows.row(i);
+    s.fail(key, fmt::format("[{}], want each to end after it begins, and to begin after the one "
+                            "before",
+                            fmt::join(row.begin(), row.end(), ", ")));
+  }
+  return one;
+}
+
 Thruster readThruster(Section s) {
   constexpr double kLongest = 1e5;  // [s]
   Thruster out;
@@ -225,11 +237,7 @@ Thruster readThruster(Section s) {
       s.fail("firings_s",
              fmt::format("{} of them, want at most {}", rows.rows(), Thruster::kMostFirings));
     for (Eigen::Index i = 0; i < rows.rows(); ++i) {
-      const Firing one{rows(i, 0), rows(i, 1)};
-      if (!(one.until > one.from) || (i > 0 && !(one.from >= rows(i - 1, 1))))
-        s.fail("firings_s", fmt::format("[{}, {}], want each to end after it begins, and to begin "
-                                        "after the one before",
-                                        one.from, one.until));
+      const Firing one = firingOf(s, "firings_s", rows, i);
       if (!(one.until - one.from >= least - 1e-9))
         s.fail("firings_s", fmt::format("[{}, {}] is shorter than least_on_s of {}", one.from,
                                         one.until, least));
@@ -262,12 +270,7 @@ ReactionWheel readWheel(Section s) {
     s.fail("torques_s_nm",
            fmt::format("{} of them, want at most {}", rows.rows(), ReactionWheel::kMostTorques));
   for (Eigen::Index i = 0; i < rows.rows(); ++i) {
-    const Firing on{rows(i, 0), rows(i, 1)};
-    if (!(on.from >= 0.0 && on.until > on.from) || (i > 0 && !(on.from >= rows(i - 1, 1))))
-      s.fail("torques_s_nm",
-             fmt::format("[{}, {}, {}], want each to end after it begins, and to begin after the "
-                         "one before",
-                         on.from, on.until, rows(i, 2)));
+    const Firing on = firingOf(s, "torques_s_nm", rows, i);
     out.torques[static_cast<std::size_t>(out.size++)] = {on, rows(i, 2)};
     if (const double taken = out.momentum(on.until); !(std::abs(taken) <= most))
       s.fail("torques_s_nm",

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ves/core/build.hpp"
 
-#include <filesystem>
-
 #include "ves/core/revision.hpp"
 
 namespace ves {
@@ -56,10 +54,17 @@ std::string_view arithmeticOf(std::string_view description) {
                                       : description.substr(at + kSeparator.size());
 }
 
-std::string_view frontDoor() {
+namespace {
+
+std::filesystem::path programFolder() {
   std::error_code error;
-  const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
-  return program.parent_path().filename() == "bin" ? "ves" : "./ves";
+  return std::filesystem::read_symlink("/proc/self/exe", error).parent_path();
 }
+
+}  // namespace
+
+std::string_view frontDoor() { return programFolder().filename() == "bin" ? "ves" : "./ves"; }
+
+std::filesystem::path installedData() { return programFolder().parent_path() / "share/ves"; }
 
 }  // namespace ves

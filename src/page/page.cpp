@@ -8,6 +8,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "ves/core/build.hpp"
 #include "ves/core/errors.hpp"
 #include "ves/page/sources.hpp"
 
@@ -18,8 +19,7 @@ namespace {
 /// libjs-dygraphs.
 std::string library(const char* file) {
   std::error_code error;
-  const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
-  const auto own = program.parent_path().parent_path() / "share/ves/javascript" / file;
+  const auto own = installedData() / "javascript" / file;
   const bool there = std::filesystem::exists(own, error);
   const std::string path = there ? own.string() : fmt::format("/usr/share/javascript/{}", file);
   std::ifstream in(path);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
+//   ticks                 the names of the cases
 //   ticks CASE [TIMES]    500 ticks of a controller under way, for what counts their instructions;
 //                         TIMES over, for what samples where their time goes
 #include <fmt/format.h>
@@ -38,5 +39,8 @@ int run(const std::string& name, int times) {
 }  // namespace ves
 
 int main(int argc, char** argv) {
+  if (argc == 1)
+    for (const ves::test::TickCase& one : ves::test::tickCases()) fmt::print("{}\n", one.name);
+  if (argc == 1) return 0;
   return argc == 2 || argc == 3 ? ves::run(argv[1], argc == 3 ? std::atoi(argv[2]) : 1) : 2;
 }

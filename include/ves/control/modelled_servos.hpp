@@ -79,9 +79,9 @@ class ModelledServos {
   ServoModel servo_;
   std::array<std::int64_t, kLegs> delay_;  // [ns] of it
   std::int64_t period_;                    // [ns] of the controller
-  double to_update_;      // [s]
-  Passage whole_;         // of an update
-  std::int64_t now_ = 0;  // [ns]
+  double to_update_;                       // [s]
+  Passage whole_;                          // of an update
+  std::int64_t now_ = 0;                   // [ns]
   Vec6 L_ = Vec6::Zero(), v_ = Vec6::Zero(), v_end_ = Vec6::Zero(), E_ = Vec6::Zero();
   std::array<Command, kCommands> commands_{};  // a ring: the newest at the number so far, less one
   std::size_t sent_ = 0;

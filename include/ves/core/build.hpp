@@ -4,6 +4,7 @@
 // replay each other's logs bit for bit, others may not.
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <string_view>
 
@@ -27,5 +28,7 @@ std::string_view arithmeticOf(std::string_view description);
 
 /// How a person calls this program: "./ves" in the checkout that it was built in, else "ves".
 std::string_view frontDoor();
+/// Where the configuration and other data lie beside the program where it is installed.
+std::filesystem::path installedData();
 
 }  // namespace ves
