@@ -9,7 +9,7 @@ namespace ves {
 ModelledServos::ModelledServos(const ServoModel& servo, double period, double phase)
     : servo_(servo),
       period_(std::llround(period * 1e9)),
-      to_update_(phase * servo.update),
+      first_update_(phase * servo.update),
       whole_(passage(servo.update)) {
   useDelays();
 }
@@ -24,6 +24,7 @@ void ModelledServos::reset(const Vec6& L, std::int64_t time) noexcept {
   v_end_.setZero();
   E_.setZero();
   now_ = time;
+  to_update_ = first_update_;
   sent_ = 0;
   send(L, -1, time - period_);
 }

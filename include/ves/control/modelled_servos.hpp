@@ -79,7 +79,8 @@ class ModelledServos {
   ServoModel servo_;
   std::array<std::int64_t, kLegs> delay_;  // [ns] of it
   std::int64_t period_;                    // [ns] of the controller
-  double to_update_;                       // [s]
+  double first_update_;                    // [s] from a reset to the first
+  double to_update_ = 0.0;                 // [s]
   Passage whole_;                          // of an update
   std::int64_t now_ = 0;                   // [ns]
   Vec6 L_ = Vec6::Zero(), v_ = Vec6::Zero(), v_end_ = Vec6::Zero(), E_ = Vec6::Zero();

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// What has been used goes like what is new: a second time of everything, on one object.
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <memory>
+
+#include "support/rig.hpp"
+#include "ves/control/test_platform.hpp"
+
+namespace ves {
+namespace {
+
+using test::experiment;
+using test::kTick;
+using test::segment;
+
+/// Controllers on one machine that goes where the first of them tells it, at once, and whose sensor
+/// and joints follow a script. The others hear the same and command nothing.
+class Machine {
+ public:
+  explicit Machine(const Experiment& e)
+      : e_(e), counts_per_wrench_(wrenchPerCount(e.controller.sensor, Mat3::Identity()).inverse()) {
+    const Geometry& g = e_.controller.geometry;
+    in_.sample.legs = legCounts(e_.controller.legs, legLengths(g, g.fromHome({})));
+    in_.sample.switches = kAllSwitchesClosed;
+    in_.sample.adc[6] = (e_.controller.safety.pressure_min + e_.controller.safety.pressure_max) / 2;
+    add();
+  }
+  void add() {
+    platforms_.push_back(std::make_unique<TestPlatform>(e_.controller));
+    states_.emplace_back();
+  }
+  /// `force` F_Po_I beyond the weight of the tick before, the first joint `q` [rad] from its place.
+  void tick(const Vec6& force = Vec6::Zero(), double q = 0.0) {
+    Sample& s = in_.sample;
+    s.time = s.legs_time = s.wrench_time = s.joints_time = ++s.sequence * kTick;
+    in_.time = s.time;
+    const Vec6 counts = counts_per_wrench_ * (first().static_wrench.stacked() + force);
+    for (std::size_t i = 0; i < 6; ++i)
+      s.adc[i] = static_cast<std::int32_t>(std::lround(counts(static_cast<Eigen::Index>(i))));
+    s.q = e_.plant.task.initial_joints;
+    s.q(0) += q;
+    for (std::size_t i = 0; i < platforms_.size(); ++i) states_[i] = platforms_[i]->tick(in_);
+    ++in_.tick;
+    in_.order = {};
+    if (first().command.engaged) s.legs = legCounts(e_.controller.legs, first().legs.L);
+  }
+  void open(std::int32_t switches) { in_.sample.switches = switches; }
+  void rest(int ticks) {
+    for (int i = 0; i < ticks; ++i) tick();
+  }
+  void order(Request request, const Segment& s = {}) {
+    in_.order.request = request;
+    in_.order.segment = s;
+    in_.order.id.sequence = ++given_;
+    for (tick(); first().refusal == Refusal::kChecking;) tick();
+    EXPECT_EQ(first().refusal, Refusal::kNone) << name(first().refusal);
+  }
+  void until(Phase phase) {
+    for (int i = 0; i < 3000 && first().phase != phase; ++i) tick();
+    ASSERT_EQ(first().phase, phase) << name(first().phase) << ", " << name(first().cause);
+  }
+  const TickState& first() const { return states_.front(); }
+  const TickState& last() const { return states_.back(); }
+
+ private:
+  Experiment e_;
+  Mat6 counts_per_wrench_;
+  std::vector<std::unique_ptr<TestPlatform>> platforms_;
+  std::vector<TickState> states_;
+  TickInput in_;
+  std::int64_t given_ = 0;
+};
+
+struct Case {
+  const char* name;
+  const char* scenario;
+  std::vector<std::string> set;
+};
+const std::vector<std::string> kBare = {
+    "controller.compensation.feed_forward=false", "controller.compensation.observer=false",
+    "controller.compensation.inertia=false", "controller.compensation.wrench=raw"};
+
+class SecondTime : public testing::TestWithParam<Case> {
+ protected:
+  Machine machine_{experiment(GetParam().scenario, GetParam().set)};
+
+  /// Four seconds of admittance control: a push, joints that swing, another push.
+  void emulate(const std::function<void()>& look = [] {}) {
+    machine_.order(Request::kRun, segment(SegmentKind::kAdmittance, 10.0));
+    const Vec6 from = machine_.first().motion.x;
+    double moved = 0.0;
+    for (int n = 0; n < 400 && !HasFatalFailure(); ++n) {
+      Vec6 force = Vec6::Zero();
+      if (n >= 20 && n < 60) force << 30.0, -20.0, 15.0, 4.0, -3.0, 2.0;
+      if (n >= 250 && n < 270) force << -40.0, 10.0, 5.0, -2.0, 6.0, 1.0;
+      machine_.tick(force, 0.01 * (1.0 - std::cos(2.0 * M_PI * 0.01 * n)));
+      moved = std::max(moved, (machine_.first().motion.x - from).cwiseAbs().maxCoeff());
+      SCOPED_TRACE(testing::Message() << "tick " << n);
+      look();
+    }
+    EXPECT_GT(moved, 1e-3);  // [m | rad]
+  }
+  /// But for what the forward kinematics leave of where they began, and where the servos' model was
+  /// told they were.
+  void expectSame() const {
+    const TickState &used = machine_.first(), &fresh = machine_.last();
+    ASSERT_EQ(used.cause, Check::kCount) << name(used.cause);
+    ASSERT_EQ(used.phase, fresh.phase);
+    ASSERT_EQ(used.kind, fresh.kind);
+    ASSERT_EQ(used.calibration, fresh.calibration);
+    ASSERT_LT((used.motion.x - fresh.motion.x).norm(), 1e-8);
+    ASSERT_LT((used.motion.x_dot - fresh.motion.x_dot).norm(), 1e-6);
+    ASSERT_LT((used.desired - fresh.desired).norm(), 1e-8);
+    ASSERT_LT((used.dynamic.stacked() - fresh.dynamic.stacked()).norm(), 1e-4);
+    ASSERT_LT((used.inertial.stacked() - fresh.inertial.stacked()).norm(), 1e-3);
+    ASSERT_LT((used.reaction.stacked() - fresh.reaction.stacked()).norm(), 1e-4);
+    ASSERT_EQ(used.withholds, fresh.withholds);
+    ASSERT_LT((used.bias - fresh.bias).norm(), 1e-6);
+    ASSERT_LT((used.reference - fresh.reference).norm(), 1e-8);
+    ASSERT_EQ(used.compensation_share, fresh.compensation_share);
+    ASSERT_NEAR(used.envelope_scale, fresh.envelope_scale, 1e-6);
+    ASSERT_NEAR(used.passivity_damping, fresh.passivity_damping, 1e-6);
+    if (used.phase != Phase::kRunning) return;  // the account of the last time can still be read
+    ASSERT_NEAR(used.energy_put_in, fresh.energy_put_in, 1e-6);
+    ASSERT_NEAR(used.energy_paid, fresh.energy_paid, 1e-6);
+    ASSERT_EQ(used.vehicle, fresh.vehicle);
+    ASSERT_NEAR(used.vehicle_energy, fresh.vehicle_energy, 1e-6);
+  }
+};
+
+TEST_P(SecondTime, OfAControllerThatTrippedIsAsANewOnesFirst) {
+  machine_.rest(20);
+  machine_.order(Request::kArm);
+  machine_.rest(300);
+  emulate();
+  machine_.order(Request::kTare);
+  machine_.rest(20);
+  machine_.open(kAllSwitchesClosed & ~1);
+  machine_.tick();
+  machine_.until(Phase::kStopped);
+  machine_.open(kAllSwitchesClosed);
+  machine_.rest(50);
+  machine_.order(Request::kReset);
+  machine_.add();
+  machine_.rest(100);
+  machine_.order(Request::kArm);
+  for (int n = 0; n < 300 && !HasFatalFailure(); ++n) {
+    machine_.tick();
+    expectSame();
+  }
+  emulate([&] { expectSame(); });
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    OfEveryKind, SecondTime,
+    testing::Values(Case{"published", "puma_on_table_4_1", kBare},
+                    Case{"compensated", "puma_on_table_4_1", test::kCompensated},
+                    Case{"passive",
+                         "puma_on_table_4_1",
+                         {"controller.passivity.enabled=true", "controller.passivity.reserve_j=0"}},
+                    Case{"filtered",
+                         "puma_on_table_4_1",
+                         {"controller.wrench_filter.dead_band_n_or_nm=[1,1,1,0.1,0.1,0.1]",
+                          "controller.wrench_filter.low_pass_hz=[5,5,5,5,5,5]"}},
+                    Case{"shuttle", "srms_low_hover_puma", {}},
+                    Case{"satellite", "satellite_puma", {}}, Case{"ship", "ship_arm", {}}),
+    [](const auto& test) { return std::string(test.param.name); });
+
+}  // namespace
+}  // namespace ves
