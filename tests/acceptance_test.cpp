@@ -110,6 +110,52 @@ TEST(Measures, WhatIsNotReachedIsNotANumber) {
   EXPECT_TRUE(std::isnan(crossing({}, {}, -1.0).value));
 }
 
+TEST(Measures, ACrossingIsWhereTheCurveComesToTheLevelFirst) {
+  const auto fell = [](double f) { return -0.2 - 0.3 * f - 0.004 * f * f; };
+  std::vector<double> f;
+  std::vector<Estimate> values;
+  for (double at : {1.0, 2.0, 3.0, 4.0, 5.0}) {
+    f.push_back(at);
+    values.push_back({fell(at), 0.01});
+  }
+  const double truth = (-0.3 + std::sqrt(0.09 + 4.0 * 0.004 * 0.9)) / 0.008;  // fell(truth) = -1.1
+  const Estimate found = crossing(f, values, -1.1);
+  EXPECT_NEAR(found.value, truth, 1e-3);
+  EXPECT_GT(found.within, 0.01 / 0.33 / 2.0);  // of a value over the slope
+  EXPECT_LT(found.within, 0.05);
+  // Below the level from the beginning, it comes to it nowhere.
+  EXPECT_TRUE(std::isnan(crossing(f, values, -0.1).value));
+  EXPECT_NEAR(crossing({1, 2, 3, 4}, {{-1, 0}, {-3, 0}, {-1, 0}, {-3, 0}}, -2.0).value, 1.5, 0.5);
+}
+
+TEST(Measures, CyclesThatRepeatEachOtherTellNoMoreThanOne) {
+  const auto within = [](double cycles) {
+    return sinusoid(sampled(cycles, 0.01,
+                            [](double t) {
+                              const double w = 2.0 * M_PI * t;
+                              return std::cos(w) + 0.1 * std::cos(7.0 * w);
+                            }),
+                    1.0)
+        .within;
+  };
+  // 1.96 times the rest's deviation on one cycle's hundred samples, of a sine's amplitude.
+  EXPECT_NEAR(within(5), 1.96 * 0.1 * std::sqrt(1.0 / 100.0), 0.1 * within(5));
+  EXPECT_NEAR(within(40), within(5), 0.1 * within(5));
+}
+
+TEST(Measures, ATurnAroundIsWhatStandsOutWhereTheSpeedIsNone) {
+  constexpr double kBump = 0.3, kWide = 0.08;  // [-] of a cycle, about one turn in two
+  const double f = 0.5, w = 2.0 * M_PI * f;
+  const Track track = sampled(20.0, 0.005, [&](double t) {
+    const double turns = f * t - std::round(f * t);
+    return 1.5 * std::cos(w * t) + (std::abs(turns) < 0.5 * kWide ? kBump : 0.0);
+  });
+  Sinusoid whole;
+  whole.of = {1.5};
+  const Estimate e = turnAround(track, whole, 1.5i * w, f);  // no speed at the turns of a cosine
+  EXPECT_NEAR(e.value, kBump * (1.0 - kWide), 0.01);
+}
+
 /// A machine that nobody of us has built: delay, play, a lag of the first order, noise.
 struct Drawn {
   double play, lag, delay;        // [m | rad], [s], [s]

@@ -317,6 +317,11 @@ INSTANTIATE_TEST_SUITE_P(
             "rows_m_deg[0]: has 5 entries, want 6"},
         Bad{"path_of_nothing", "z_sine", "program=[{path: {rows_m_deg: []}}]",
             "rows_m_deg: want one or more rows of 6 numbers"},
+        Bad{"admittance_of_a_slip", "z_sine", "program=[{admittance: {duration_s: 5, lasts: 1}}]",
+            "lasts: unknown key"},
+        Bad{"path_of_a_slip", "z_sine",
+            "program=[{path: {rows_m_deg: [[0, 0, 0, 0, 0, 0]], rows_m: 1}}]",
+            "rows_m: unknown key"},
         Bad{"two_paths", "z_sine",
             "program=[{path: {rows_m_deg: [[0, 0, 0, 0, 0, 0]]}}, {path: {rows_m_deg: [[0, 0, 0, "
             "0, 0, 0]]}}]",
@@ -798,6 +803,209 @@ TEST(Config, WhatDecidesAboutSafetyIsAKey) {
   EXPECT_EQ(l.window, 0.25);
   EXPECT_EQ(l.window_growth, 1.75);
   EXPECT_EQ(l.tool_singularity, 0.125);
+}
+
+// A key's unit is in its name; the programs reckon in SI. Each with a value of its own, so that
+// none stands in another's place.
+TEST(Config, EveryNumberArrivesInItsPlaceInSi) {
+  struct Row {
+    const char* set;
+    double value;
+    std::function<double(const Experiment&)> is;
+  };
+  const auto arrive = [](const char* scenario, std::vector<std::string> more,
+                         const std::vector<Row>& rows) {
+    for (const Row& row : rows) more.push_back(row.set);
+    const Experiment e = test::experiment(scenario, more);
+    for (const Row& row : rows)
+      EXPECT_NEAR(row.is(e), row.value, 1e-12 * std::abs(row.value)) << row.set;
+  };
+  constexpr double kTurn = 2.0 * M_PI, kDeg = M_PI / 180.0, kInch = 0.0254;
+  const auto c = [](auto of) { return [of](const Experiment& e) { return of(e.controller); }; };
+  const auto p = [](auto of) { return [of](const Experiment& e) { return of(e.plant); }; };
+  arrive(
+      "z_sine", {},
+      {{"controller.gentle_speed_m_per_s=0.07", 0.07, c([](auto& x) { return x.gentle.speed; })},
+       {"controller.gentle_rotation_deg_per_s=11", 11 * kDeg,
+        c([](auto& x) { return x.gentle.rotation; })},
+       {"controller.gentle_braking_m_per_s2=0.33", 0.33,
+        c([](auto& x) { return x.gentle.braking.translation; })},
+       {"controller.gentle_rotation_braking_deg_per_s2=44", 44 * kDeg,
+        c([](auto& x) { return x.gentle.braking.rotation; })},
+       {"controller.stop_braking_m_per_s2=4.5", 4.5,
+        c([](auto& x) { return x.stop_braking.translation; })},
+       {"controller.stop_rotation_braking_deg_per_s2=456", 456 * kDeg,
+        c([](auto& x) { return x.stop_braking.rotation; })},
+       {"controller.tare_ramp_s=1.7", 1.7, c([](auto& x) { return x.tare_ramp; })},
+       {"controller.compensation.ramp_s=1.9", 1.9, c([](auto& x) { return x.compensation.ramp; })},
+       {"controller.compensation.reading_jitter_s=0.0004", 0.0004,
+        c([](auto& x) { return x.compensation.jitter; })},
+       {"controller.compensation.forgetting_s=23", 23,
+        c([](auto& x) { return x.compensation.forgetting; })},
+       {"controller.compensation.gate_deviations=5.5", 5.5,
+        c([](auto& x) { return x.compensation.gate; })},
+       {"controller.compensation.gate_hold_s=0.21", 0.21,
+        c([](auto& x) { return x.compensation.gate_hold; })},
+       {"controller.compensation.timing_error_s=0.0006", 0.0006,
+        c([](auto& x) { return x.compensation.timing_error; })},
+       {"controller.compensation.gain_error=0.06", 0.06,
+        c([](auto& x) { return x.compensation.gain_error; })},
+       {"controller.compensation.mass_error=0.07", 0.07,
+        c([](auto& x) { return x.compensation.mass_error; })},
+       {"controller.passivity.reserve_j=0.002", 0.002,
+        c([](auto& x) { return x.passivity.reserve; })},
+       {"controller.passivity.damping_per_s=9", 9, c([](auto& x) { return x.passivity.damping; })},
+       {"controller.moving_frame.share=0.4", 0.4, c([](auto& x) { return x.moving_frame.share; })},
+       {"controller.moving_frame.acceleration_m_per_s2=0.03", 0.03,
+        c([](auto& x) { return x.moving_frame.acceleration; })},
+       {"controller.moving_frame.acceleration_deg_per_s2=0.7", 0.7 * kDeg,
+        c([](auto& x) { return x.moving_frame.angular_acceleration; })},
+       {"controller.still.leg_counts=3", 3, c([](auto& x) { return x.stillness.leg_counts; })},
+       {"controller.still.joint_rad_or_m=0.002", 0.002,
+        c([](auto& x) { return x.stillness.joint; })},
+       {"controller.still.deviation_counts=31", 31,
+        c([](auto& x) { return x.stillness.deviation; })},
+       {"controller.still.bias_v=0.8", 0.8 / 4e-4, c([](auto& x) { return x.stillness.bias; })},
+       {"sensor.volts_per_count=4.0e-4", 4e-4, p([](auto& x) { return x.sensor.volts_per_count; })},
+       {"sensor.cutoff_hz=19", 19 * kTurn, c([](auto& x) { return x.servo.sensor_cutoff; })},
+       {"sensor.excitation_v=9", 9, p([](auto& x) { return x.sensor.excitation; })},
+       {"sensor.temperature.mean_c=21", 21, p([](auto& x) { return x.climate.mean; })},
+       {"sensor.temperature.swing_c=3.5", 3.5, p([](auto& x) { return x.climate.swing; })},
+       {"sensor.temperature.period_h=23", 23 * 3600.0, p([](auto& x) { return x.climate.period; })},
+       {"sensor.temperature.rising_h=8", 8 * 3600.0, p([](auto& x) { return x.climate.rising; })},
+       {"legs.gain_extend_in_per_s_per_ma=1.1", 1.1 * kInch / 1e-3,
+        p([](auto& x) { return x.actuator.gain_extend; })},
+       {"legs.gain_retract_in_per_s_per_ma=0.7", 0.7 * kInch / 1e-3,
+        p([](auto& x) { return x.actuator.gain_retract; })},
+       {"legs.tau_s=0.012", 0.012, p([](auto& x) { return x.actuator.tau; })},
+       {"legs.counts_per_in=420", kInch / 420, p([](auto& x) { return x.transducer.scale; })},
+       {"legs.watchdog.hold_after_ticks=4", 4 * 10'000'000,
+        p([](auto& x) { return static_cast<double>(x.watchdog.hold_after); })},
+       {"legs.watchdog.park_after_s=11", 11e9,
+        p([](auto& x) { return static_cast<double>(x.watchdog.park_after); })},
+       {"legs.watchdog.park_time_s=21", 21e9,
+        p([](auto& x) { return static_cast<double>(x.watchdog.park_time); })}});
+  const auto leg = [&](auto of) { return p([of](auto& x) { return of(x.hydraulic->leg); }); };
+  arrive(
+      "z_sine", {"legs.model=hydraulic"},
+      {{"legs.hydraulic.supply_mpa=10.1", 10.1e6, leg([](auto& x) { return x.oil.supply; })},
+       {"legs.hydraulic.bore_area_cm2=11.5", 11.5e-4, leg([](auto& x) { return x.cylinder.bore; })},
+       {"legs.hydraulic.bulk_modulus_mpa=1300", 1.3e9,
+        leg([](auto& x) { return x.oil.bulk_modulus; })},
+       {"legs.hydraulic.hose_volume_cm3=21", 21e-6, leg([](auto& x) { return x.oil.hoses; })},
+       {"legs.hydraulic.leak_l_per_min_mpa=0.02", 0.02 * 1e-3 / 60 / 1e6,
+        leg([](auto& x) { return x.oil.leak; })},
+       {"legs.hydraulic.valve_hz=61", 61 * kTurn, leg([](auto& x) { return x.valve.frequency; })},
+       {"legs.hydraulic.valve_damping=0.89", 0.89, leg([](auto& x) { return x.valve.damping; })},
+       {"legs.hydraulic.valve_limit_ma=39", 0.039, leg([](auto& x) { return x.valve.limit; })},
+       {"legs.hydraulic.valve_opening_ma=0.2", 2e-4, leg([](auto& x) { return x.valve.opening; })},
+       {"legs.hydraulic.pressure_feedback_ma_per_mpa=1.4", 1.4e-9,
+        leg([](auto& x) { return x.valve.feedback; })},
+       {"legs.hydraulic.pressure_feedback_s=0.04", 0.04,
+        leg([](auto& x) { return x.valve.feedback_time; })},
+       {"legs.hydraulic.coulomb_n=160", 160, leg([](auto& x) { return x.seals.coulomb; })},
+       {"legs.hydraulic.breakaway_n=230", 230, leg([](auto& x) { return x.seals.breakaway; })},
+       {"legs.hydraulic.stribeck_m_per_s=0.02", 0.02,
+        leg([](auto& x) { return x.seals.stribeck; })},
+       {"legs.hydraulic.viscous_n_s_per_m=1100", 1100,
+        leg([](auto& x) { return x.seals.viscous; })},
+       {"legs.hydraulic.presliding_m=25.0e-6", 160 / 25e-6,
+        leg([](auto& x) { return x.seals.bristle; })},
+       {"legs.hydraulic.presliding_n_s_per_m=3100", 3100,
+        leg([](auto& x) { return x.seals.bristle_damping; })},
+       {"legs.hydraulic.stop_n_per_m=2.1e7", 2.1e7, leg([](auto& x) { return x.cylinder.stop; })},
+       {"legs.hydraulic.stop_n_s_per_m=2.2e4", 2.2e4,
+        leg([](auto& x) { return x.cylinder.stop_damping; })},
+       {"legs.hydraulic.play_m=0.0001", 1e-4, leg([](auto& x) { return x.cylinder.play; })},
+       {"legs.hydraulic.play_closes_at_n=55", 55, leg([](auto& x) { return x.cylinder.seating; })},
+       {"legs.hydraulic.plate.mass_kg=121", 121,
+        p([](auto& x) { return x.hydraulic->plate_P.mass; })},
+       {"legs.hydraulic.reading_noise_m=1.0e-5", 1e-5,
+        p([](auto& x) { return x.hydraulic->reading.noise; })},
+       {"legs.hydraulic.reading_hysteresis_m=2.0e-5", 2e-5,
+        p([](auto& x) { return x.hydraulic->reading.hysteresis; })}});
+  // What a machine's mismatch scales, and that alone.
+  const auto seals = [](const Experiment& e) { return e.plant.hydraulic->leg.seals; };
+  const Experiment told = test::experiment("z_sine", {"legs.model=hydraulic"}),
+                   other = test::experiment(
+                       "z_sine", {"legs.model=hydraulic", "plant_mismatch={friction: 1.5}"});
+  EXPECT_EQ(seals(other).coulomb, 1.5 * seals(told).coulomb);
+  EXPECT_EQ(seals(other).breakaway, 1.5 * seals(told).breakaway);
+  EXPECT_EQ(seals(other).bristle, 1.5 * seals(told).bristle);
+  EXPECT_EQ(seals(other).bristle_damping, seals(told).bristle_damping);
+  EXPECT_EQ(seals(other).viscous, seals(told).viscous);
+  const std::string encoders =
+      "robot.encoders={counts_per_turn: 4096, play_deg_or_m: 0.2, noise_deg_or_m: 0.03, rate_hz: "
+      "50}";
+  arrive("puma_on_table_4_1", {encoders, "robot.mount_rpy_deg=[0, 0, 30]"},
+         {{"controller.still.joint_rad_or_m=1.0e-4", kTurn / 4096 + 8 * 0.03 * kDeg,
+           c([](auto& x) { return x.stillness.joint; })},
+          {"seed=3", kTurn / 4096, p([](auto& x) { return x.joints.count(1); })},
+          {"seed=3", 0.2 * kDeg, p([](auto& x) { return x.joints.play(1); })},
+          {"seed=3", 0.03 * kDeg, p([](auto& x) { return x.joints.noise(1); })},
+          {"seed=3", 0.02, c([](auto& x) { return x.joints.interval; })},
+          // Uniform over a count, and over the play, beside the noise.
+          {"seed=3",
+           std::sqrt((std::pow(kTurn / 4096, 2) + std::pow(0.2 * kDeg, 2)) / 12.0 +
+                     std::pow(0.03 * kDeg, 2)),
+           c([](auto& x) { return x.joints.deviation(1); })},
+          {"seed=3", std::sin(30 * kDeg), c([](auto& x) { return x.payload.X_RL0.R(1, 0); })}});
+}
+
+TEST(Config, ALimitsUnitIsInItsKey) {
+  SafetyLimits l;
+  constexpr double kVoltsPerCount = 3e-4;
+  std::apply(
+      [&](const auto&... limit) {
+        const auto look = [&](std::string key, double unit) {
+          const auto ends = [&](const char* with) { return key.ends_with(with); };
+          const double want = key.find("_deg") != std::string::npos     ? M_PI / 180.0
+                              : ends("_v")                              ? 1.0 / kVoltsPerCount
+                              : key.find("_cm2") != std::string::npos   ? 1e-4
+                              : key.find("_l_per") != std::string::npos ? 1e-3
+                                                                        : 1.0;
+          EXPECT_DOUBLE_EQ(unit, want) << key;
+        };
+        (look(limit.key, limit.unit), ...);
+      },
+      limitTable(l, kVoltsPerCount));
+}
+
+// Huygens and Steiner, by hand.
+TEST(Config, AnInertiaAboutAnotherPointIsThatOfTheSameBody) {
+  const auto body = [](const std::string& inertia) {
+    const Experiment e = test::experiment(
+        "satellite_puma",
+        {"base=!replace {free: {mass_kg: 100, center_m: [0.1, -0.2, 0.3], " + inertia + "}}"});
+    return std::get<FreeBodyModel>(e.controller.vehicle.kind).body_P;
+  };
+  const RigidBody about_center = body("inertia_kg_m2: [50, 60, 70, 1, 2, 3]");
+  // From the point (0.2, 0.2, -0.1) the centre is at (-0.1, -0.4, 0.4): 100 kg times its squares
+  // are 1, 16 and 16 kg m^2.
+  const RigidBody about_point =
+      body("inertia_about_m: [0.2, 0.2, -0.1], inertia_kg_m2: [82, 77, 87, -3, 6, 19]");
+  EXPECT_LT((about_point.I_Bcm_B - about_center.I_Bcm_B).norm(), 1e-12);
+  EXPECT_EQ(about_point.p_BoBcm_B, about_center.p_BoBcm_B);
+}
+
+TEST(Config, AnExcitationIsProposedWhereTheBeliefIsWideAndNothingElseTells) {
+  const auto proposed = [](std::vector<std::string> set) {
+    set.insert(set.end(), test::kCompensated.begin(), test::kCompensated.end());
+    set.insert(set.end(), {"controller.compensation.wrench=aided", "sensor.readings_per_tick=4"});
+    const Experiment e = test::experiment("puma_on_table_4_1", set);
+    const auto& says = e.source.notes;
+    const auto& warns = e.source.warnings;
+    const auto has = [](const std::vector<std::string>& lines) {
+      return std::any_of(lines.begin(), lines.end(), [](const std::string& line) {
+        return line.find("excite") != std::string::npos;
+      });
+    };
+    return has(says) || has(warns);
+  };
+  EXPECT_TRUE(proposed({"controller.compensation.learns_masses=true"}));
+  EXPECT_FALSE(proposed(
+      {"controller.compensation.learns_masses=true", "controller.compensation.mass_error=0.01"}));
+  EXPECT_FALSE(proposed({"controller.compensation.learns_masses=false"}));
 }
 
 }  // namespace

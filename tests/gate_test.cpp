@@ -155,6 +155,8 @@ TEST(Gate, BarsAdmittanceControlUnlessForced) {
   Experiment good = test::unassessed("srms_deploy_doss");
   EXPECT_EQ(applyStabilityCheck(good), "");
   EXPECT_EQ(good.controller.stability, Stability::kStable);
+  EXPECT_EQ(good.controller.stability_uncompensated, Stability::kStable);
+  EXPECT_EQ(good.controller.stable_for_uncompensated, HUGE_VAL);
 }
 
 TEST(Gate, ProgramThatHasItDoesNotBegin) {
@@ -323,6 +325,9 @@ TEST(Gate, NamesWhatCuresAMachineThatGivesWay) {
   EXPECT_NE(said.find("which gives way at "), std::string::npos) << said;
   const auto cutoff = said.find("a sensor cutoff of "), feedback = said.find("feedback of ");
   ASSERT_NE(std::min(cutoff, feedback), std::string::npos) << said;
+  EXPECT_EQ(said.find(" with pressure") != std::string::npos,
+            cutoff != std::string::npos && feedback != std::string::npos)
+      << said;
   std::vector<std::string> cure;
   if (cutoff != std::string::npos)
     cure.push_back("sensor.cutoff_hz=" + std::to_string(std::stod(said.substr(cutoff + 19))));

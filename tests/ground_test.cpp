@@ -290,6 +290,45 @@ TEST(Sea, AShipAnswersByFrequencyHeadingAndPhase) {
   }
 }
 
+TEST(Sea, AResponseIsByLinesBetweenItsFrequenciesAndThePeakIsNarrowerBelow) {
+  // Of 196 waves, from half the peak's frequency to four times that, 28 are below it.
+  // Two ships: one heaves as the water does, the other by f itself, told at uneven frequencies.
+  const auto waves = [](const std::string& rows) {
+    return test::experiment(
+               "ship_arm",
+               {"base=!replace {ground: {fade_s: 0.5, sea: {significant_height_m: 0.2, "
+                "peak_period_s: 5, peakedness: 4, heading_deg: 0, waves: 196, seed: 4, responses: "
+                "[{heading_deg: 0, rows: [" +
+                rows + "]}]}}}"})
+        .controller.vehicle.ground.waves;
+  };
+  const auto row = [](double f, double heave) {
+    return fmt::format("[{}, 0,0, 0,0, {},0, 0,0, 0,0, 0,0]", f, heave);
+  };
+  const auto water = waves(row(0.01, 1) + "," + row(9, 1)),
+             ship = waves(row(0.01, 0.01) + "," + row(0.13, 0.13) + "," + row(0.3, 0.3) + "," +
+                          row(9, 9));
+  ASSERT_EQ(water.cols(), ship.cols());
+  double below = 0.0, all = 0.0;
+  for (Eigen::Index i = 0; i < water.cols(); ++i) {
+    const double f = water(0, i) / (2.0 * M_PI), a = std::hypot(water(3, i), water(9, i));
+    EXPECT_EQ(water(0, i), ship(0, i));
+    EXPECT_NEAR(std::hypot(ship(3, i), ship(9, i)), f * a, 1e-12);
+    (f < 0.2 ? below : all) += a * a;
+  }
+  all += below;
+  // Hasselmann and others (JONSWAP, 1973): 0.07 below the peak, 0.09 above.
+  double s_below = 0.0, s_all = 0.0;
+  for (double f = 0.1; f < 0.8; f += 1e-5) {
+    const double width = f < 0.2 ? 0.07 : 0.09,
+                 S = std::pow(f, -5.0) * std::exp(-1.25 * std::pow(0.2 / f, 4.0)) *
+                     std::pow(4.0, std::exp(-0.5 * std::pow((f - 0.2) / (width * 0.2), 2.0)));
+    s_all += S;
+    if (f < 0.2) s_below += S;
+  }
+  EXPECT_NEAR(below / all, s_below / s_all, 0.005);  // with the widths exchanged 0.03 more
+}
+
 class GroundFile : public test::Programs {
  protected:
   /// One line of refusal of a recording.

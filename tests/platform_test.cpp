@@ -186,6 +186,10 @@ TEST(AnyPlatform, SpeedAndErrorsFollowFromTheSlowerDirection) {
   EXPECT_NEAR(l.leg_max, 1.85 - 0.03 * 0.65, 1e-12);
   EXPECT_NEAR(l.position_error_still, 0.015 * 0.65, 1e-12);
   EXPECT_NEAR(l.reading_jump, 0.003 * 0.65, 1e-12);
+  EXPECT_NEAR(l.joint_cone, p.use.joint_angle + 5.0 * kDegree, 1e-12);
+  EXPECT_NEAR(l.leg_clearance, 0.8 * p.use.clearance, 1e-12);
+  EXPECT_NEAR(l.plate_angle, 0.8 * p.use.plate_angle, 1e-12);
+  EXPECT_NEAR(l.condition, 1.5 * p.use.condition, 1e-12);
   const double least = p.use.leg_least.minCoeff(), most = p.use.leg_most.maxCoeff();
   EXPECT_NEAR(derivedStroke(p.use).max - most, 0.05 * (most - least), 1e-12);
   EXPECT_NEAR(least - derivedStroke(p.use).min, 0.05 * (most - least), 1e-12);

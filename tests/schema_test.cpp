@@ -477,5 +477,91 @@ TEST(Schema, EveryFieldComesOutOfPython) {
   fs::remove_all(folder);
 }
 
+/// Lines of a file.
+std::vector<std::string> linesOf(const fs::path& file) {
+  std::ifstream in(file);
+  std::vector<std::string> out;
+  for (std::string line; std::getline(in, line);) out.push_back(line);
+  return out;
+}
+
+// The definitions of messages, the lists of their fields and their table, as the build writes them.
+class Describe : public test::Programs {
+ protected:
+  template <typename S>
+  void goes(const std::string& values, const std::vector<std::string>& table) {
+    const S s{};
+    const schema::Message& message = schema::kMessage<S>;
+    const auto lcm = linesOf(folder_ / (std::string(message.name) + ".lcm"));
+    ASSERT_FALSE(lcm.empty()) << message.name;
+    EXPECT_EQ(lcm.front(), "package ves;");
+    EXPECT_EQ(lcm.back(), "}");
+    std::string about;  // in lines that fit
+    auto line = lcm.begin() + 2;
+    for (; line->starts_with("// "); ++line) {
+      EXPECT_LE(line->size(), 100u) << *line;
+      about += line->substr(2);
+    }
+    EXPECT_EQ(about, " " + std::string(message.about));
+    EXPECT_EQ(*line++, "struct " + std::string(message.name) + " {");
+    EXPECT_EQ(*line++, "  header_t header;");
+    auto row = std::find(table.begin(), table.end(), "## " + std::string(message.name));
+    ASSERT_NE(row, table.end());
+    EXPECT_EQ(*(row + 2), message.about);
+    row += 6;
+    std::string list;
+    schema::forEach(s, [&](const auto& field) {
+      // "  double x[6];  // [m | rad] what it means", and the same as a row.
+      const std::string name = field.name, unit = "[" + std::string(field.unit) + "]";
+      EXPECT_NE(line->find(" " + name + (line->find(name + "[") == std::string::npos ? ";" : "[")),
+                std::string::npos)
+          << *line;
+      EXPECT_NE(
+          line->find(";  // " + unit + (*field.meaning ? " " + std::string(field.meaning) : "")),
+          std::string::npos)
+          << *line;
+      if (!*field.meaning) {
+        EXPECT_TRUE(line->ends_with("]") || line->find("; 0 ") != std::string::npos);
+      }
+      EXPECT_TRUE(row->starts_with("| `" + name + "` | ")) << *row;
+      EXPECT_NE(row->find(" | " + std::string(field.unit) + " | " + field.meaning),
+                std::string::npos)
+          << *row;
+      list += (list.empty() ? "m." : ", m.") + name;
+      ++line;
+      ++row;
+    });
+    EXPECT_EQ(*line, "}");
+    for (const std::string qualifier : {"", "const "})
+      EXPECT_NE(values.find("inline auto values(" + qualifier + message.name +
+                            "& m) { return std::tie(" + list + "); }\n"),
+                std::string::npos)
+          << message.name;
+    EXPECT_NE(values.find("#include <ves/" + std::string(message.name) + ".hpp>\n"),
+              std::string::npos);
+  }
+};
+
+TEST_F(Describe, EveryFieldHasItsLineItsRowAndItsPlaceInTheList) {
+  fs::create_directories(folder_ / "ves");
+  const test::Output made =
+      test::sh(std::string("'") + VES_TEST_APP_DIR + "/../src/ves_describe' " + folder_.string());
+  ASSERT_EQ(made.status, 0) << made.text;
+  std::stringstream values;
+  values << std::ifstream(folder_ / "ves" / "values.hpp").rdbuf();
+  const auto table = linesOf(folder_ / "messages.md");
+  goes<Sample>(values.str(), table);
+  goes<LegCommand>(values.str(), table);
+  goes<MachineSetup>(values.str(), table);
+  goes<Order>(values.str(), table);
+  goes<TickState>(values.str(), table);
+  const auto phase = std::find_if(table.begin(), table.end(), [](const std::string& row) {
+    return row.starts_with("| `phase` |");
+  });
+  ASSERT_NE(phase, table.end());
+  EXPECT_NE(phase->find("0 disarmed, 1 armed, 2 running"), std::string::npos) << *phase;
+  EXPECT_EQ(test::sh(std::string("'") + VES_TEST_APP_DIR + "/../src/ves_describe'").status, 2);
+}
+
 }  // namespace
 }  // namespace ves

@@ -87,12 +87,13 @@ class SecondTime : public testing::TestWithParam<Case> {
  protected:
   Machine machine_{experiment(GetParam().scenario, GetParam().set)};
 
-  /// Four seconds of admittance control: a push, joints that swing, another push.
+  /// Four seconds of admittance control: a push, joints that swing, another push. It ends while
+  /// they swing.
   void emulate(const std::function<void()>& look = [] {}) {
     machine_.order(Request::kRun, segment(SegmentKind::kAdmittance, 10.0));
     const Vec6 from = machine_.first().motion.x;
     double moved = 0.0;
-    for (int n = 0; n < 400 && !HasFatalFailure(); ++n) {
+    for (int n = 0; n < 420 && !HasFatalFailure(); ++n) {
       Vec6 force = Vec6::Zero();
       if (n >= 20 && n < 60) force << 30.0, -20.0, 15.0, 4.0, -3.0, 2.0;
       if (n >= 250 && n < 270) force << -40.0, 10.0, 5.0, -2.0, 6.0, 1.0;

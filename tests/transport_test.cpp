@@ -457,6 +457,50 @@ TEST(Messages, OfAnotherSchemaAreNotDecoded) {
   }
 }
 
+TEST(Messages, EveryOrderToTheRobotComesOutAsItWentIn) {
+  const auto through = [](const RobotOrder& order) {
+    const auto out = fromMessage(toMessage(order, header({1, 2}, 3, 4)));
+    EXPECT_TRUE(out);
+    return out.value_or(RobotOrder(Release()));
+  };
+  const RobotMove move{2, -0.3, 1.5};
+  EXPECT_EQ(std::get<RobotMove>(through(move)), move);
+  EXPECT_TRUE(std::holds_alternative<Release>(through(Release())));
+  for (const auto on : {PushOrder::On::kPlatform, PushOrder::On::kTool, PushOrder::On::kTarget}) {
+    const PushOrder push{on, {0.1, -0.2, 0.3}, {11.0, -12.0, 13.0}, 2.5};
+    EXPECT_EQ(std::get<PushOrder>(through(push)), push);
+  }
+  HandOrder hand;
+  hand.body_T = {2.0, {0.01, -0.02, 0.03}, Mat3::Zero()};
+  hand.body_T.I_Bcm_B << 0.04, 0.001, 0.002, 0.001, 0.05, 0.003, 0.002, 0.003, 0.06;
+  EXPECT_EQ(std::get<HandOrder>(through(hand)).body_T, hand.body_T);
+  for (int parts = 1; parts < 8; ++parts)
+    for (const auto in :
+         {ToolOrder::Frame::kRobot, ToolOrder::Frame::kPlatform, ToolOrder::Frame::kInertial}) {
+      ToolOrder tool;
+      tool.by = parts % 2 == 0;
+      tool.in = in;
+      if (parts & 1) tool.position = Vec3(0.1, 0.2, 0.3);
+      if (parts & 2) tool.rpy = Vec3(0.4, 0.5, 0.6);
+      if (parts & 4) tool.via = Vec3(0.7, 0.8, 0.9);
+      (parts & 1 ? tool.duration : tool.speed) = 0.25;
+      const auto sent = toMessage(tool, header({1, 2}, 3, 4));
+      const auto came = fromMessage(sent);
+      if (!came) {
+        EXPECT_TRUE(tool.via && !tool.position) << parts;  // a way to nowhere
+        continue;
+      }
+      const auto& out = std::get<ToolOrder>(*came);
+      EXPECT_EQ(out.by, tool.by);
+      EXPECT_EQ(out.in, tool.in);
+      EXPECT_EQ(out.position, tool.position);
+      EXPECT_EQ(out.rpy, tool.rpy);
+      EXPECT_EQ(out.via, tool.via);
+      EXPECT_EQ(out.duration, tool.duration);
+      EXPECT_EQ(out.speed, tool.speed);
+    }
+}
+
 // The visitor names every byte of an encoding: nothing is left out, nothing counted twice.
 TEST(Messages, FieldsCoverEveryByteOfTheirEncoding) {
   const auto covers = [](const auto& m) {

@@ -250,6 +250,7 @@ TEST(UrdfFile, QuaternionsAreAttitudes) {
           .model.link(0)
           .X_parent;
   EXPECT_LT((X.R * Vec3::UnitX() + Vec3::UnitZ()).norm(), 1e-12);  // a quarter turn about y
+  EXPECT_TRUE(says(Parts{.origin = R"(<origin quat_xyzw="0 0 0 0"/>)"}.refused(), "no direction"));
   EXPECT_TRUE(says(Parts{.origin = R"(<origin rpy="0 0 0" quat_xyzw="0 0 0 1"/>)"}.refused(),
                    "want one of them"));
 }

@@ -129,6 +129,13 @@ class Finder:
     @staticmethod
     def share(one, two):
         """One of them changes what the other names: else their order has no meaning."""
+        def sides(text):  # of an assignment
+            return re.match(r"([^=!<>]+?)\s*[-+*/|&]?=(?!=)(.*)", text, re.S)
+
+        if (a := sides(one)) and (b := sides(two)):
+            (to, of), (to_2, of_2) = a.groups(), b.groups()
+            return to in of_2 or to_2 in of or to.startswith(to_2) or to_2.startswith(to)
+
         def names(text):
             return set(re.findall(r"[A-Za-z_]\w{2,}", text)) - {"std", "Zero", "move"}
 

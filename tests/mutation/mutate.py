@@ -234,29 +234,43 @@ def noticed(record, binary, names, allowed):
     return failed.group(1).rstrip(",") if failed else f"{binary}: status {done.returncode}"
 
 
+def known_results():
+    """What earlier runs found, by key_of()."""
+    file = WORK / "results.json"
+    return {key_of(r): r for r in json.loads(file.read_text())} if file.exists() else {}
+
+
 def run(args):
     records = json.loads((WORK / "mutants.json").read_text())
     dropped = set(json.loads((WORK / "dropped.json").read_text()))
-    results_file = WORK / "results.json"
-    results = {r["id"]: r for r in json.loads(results_file.read_text())} \
-        if results_file.exists() and args.which else {}
-    before = {key_of(r): r["killed_by"] for r in json.loads(results_file.read_text())} \
-        if results_file.exists() else {}
+    known = known_results()
+    before = {key: r["killed_by"] for key, r in known.items()}
     wanted = set(args.which)
-    chosen = [r for r in records if r["id"] not in dropped and
-              (not wanted or str(r["id"]) in wanted or r["module"] in wanted or
-               ("survivors" in wanted and not results.get(r["id"], {}).get("killed_by")))]
+
+    def chosen(r):
+        if not wanted or str(r["id"]) in wanted or r["module"] in wanted:
+            return True
+        return "survivors" in wanted and not before.get(key_of(r))
+
+    records = [r for r in records if r["id"] not in dropped]
+    results = {r["id"]: {**known[key_of(r)], "id": r["id"]} for r in records
+               if not chosen(r) and key_of(r) in known}
     tests = measure_coverage()
+    left = [r for r in records if chosen(r)]
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-        for n, result in enumerate(pool.map(lambda r: attack(r, tests, before), chosen), start=1):
+        for n, result in enumerate(pool.map(lambda r: attack(r, tests, before), left), start=1):
             results[result["id"]] = result
             if not result["killed_by"]:
                 print(f"{result['id']:4} {result['file']}:{result['line']}: {result['what']}: "
                       f"{result['text'][:70]!r} ({result['covered']} tests pass it)", flush=True)
             if n % 20 == 0:
-                results_file.write_text(json.dumps(list(results.values()), indent=1))
-    results_file.write_text(json.dumps(list(results.values()), indent=1))
+                keep(results)
+    keep(results)
     table(args)
+
+
+def keep(results):
+    (WORK / "results.json").write_text(json.dumps(list(results.values()), indent=1))
 
 
 def equivalents():
