@@ -8,6 +8,7 @@
 
 #include <filesystem>
 
+#include "support/obedient_machine.hpp"
 #include "support/refusal.hpp"
 #include "support/rig.hpp"
 #include "support/robots.hpp"
@@ -286,6 +287,151 @@ TEST(Watch, SixtyFiveHoursFollowTheTemperature) {
     const double z = 4.0 * 0.9 * M_SQRT2 * std::abs(C(2, 2)) + 0.05;
     EXPECT_NEAR(l.mean(2) - looks[0].mean(2), drift.f.z(), 2.0 * z) << l.t - t0;
   }
+}
+
+struct Named {
+  const char* name;
+  Order order;
+};
+const std::vector<Named>& everyOrder() {
+  static const std::vector<Named> all = [] {
+    std::vector<Named> out;
+    for (int i = 1; i < static_cast<int>(Request::kCount); ++i) {
+      const auto request = static_cast<Request>(i);
+      if (request == Request::kRun) continue;
+      Order order{request, {}, {}};
+      if (request == Request::kVehicle)
+        order.vehicle.to.mass = 2.0, order.vehicle.over = 0.5,
+        order.verdict = {Stability::kStable, Stability::kStable};
+      out.push_back({name(request).data(), order});
+    }
+    Segment move = segment(SegmentKind::kMove, 1.0);
+    move.target.p = {0.02, 0.0, 0.03};
+    Segment watch = segment(SegmentKind::kMonitor, 3.0);
+    watch.interval = 1.0;
+    out.push_back({"move", {Request::kRun, move, {}}});
+    out.push_back({"trajectory", {Request::kRun, sine(2, 0.02, 0.7, 3.0), {}}});
+    out.push_back({"admittance", {Request::kRun, segment(SegmentKind::kAdmittance, 3.0), {}}});
+    out.push_back({"calibration", {Request::kRun, segment(SegmentKind::kCalibration), {}}});
+    out.push_back({"monitor", {Request::kRun, watch, {}}});
+    return out;
+  }();
+  return all;
+}
+
+#ifdef VES_SANITIZE
+constexpr int kPairs = 7;  // one in so many
+#else
+constexpr int kPairs = 1;
+#endif
+
+class OrdersInPhase : public testing::TestWithParam<int> {};
+
+// Any two orders, whatever is under way: each is answered, nothing jumps, and a hold ends it.
+TEST_P(OrdersInPhase, AreAnsweredWithoutAJumpAndAHoldEndsThem) {
+  const Named& under_way = everyOrder()[static_cast<std::size_t>(GetParam())];
+  static const Experiment e = experiment("puma_on_table_4_1", test::kCompensated);
+  int pair = 0;
+  for (const int since : {1, 60})
+    for (const Named& one : everyOrder())
+      for (const Named& two : everyOrder()) {
+        if (pair++ % kPairs != 0) continue;
+        SCOPED_TRACE(testing::Message() << under_way.name << ", " << since << " ticks later "
+                                        << one.name << ", then " << two.name);
+        test::ObedientMachine machine(e);
+        machine.rest(11);
+        machine.order(Request::kArm);
+        machine.rest(12);
+        std::vector<std::int64_t> open;
+        Vec6 x = machine.first().motion.x, v = machine.first().motion.x_dot;
+        bool loose = false;  // where the legs are not ours the pose is the measured one
+        const auto tick = [&] {
+          machine.tick(Vec6::Unit(0) * 10.0);
+          const TickState& s = machine.first();
+          if (s.refusal != Refusal::kChecking) std::erase(open, s.order.sequence);
+          ASSERT_EQ(s.cause, Check::kCount) << name(s.cause);
+          ASSERT_TRUE(s.motion.x.allFinite());
+          if (s.command.engaged && !loose) {
+            ASSERT_LT((s.motion.x_dot - v).norm(), 0.1) << "tick " << s.tick;
+            ASSERT_LT((s.motion.x - x - 0.005 * (s.motion.x_dot + v)).norm(), 5e-4)
+                << "tick " << s.tick;
+          }
+          loose = !s.command.engaged;
+          x = s.motion.x;
+          v = s.motion.x_dot;
+        };
+        open.push_back(machine.give(under_way.order));
+        for (int n = 0; n < 1 + since && !HasFatalFailure(); ++n) tick();
+        open.push_back(machine.give(one.order));
+        if (!HasFatalFailure()) tick();
+        open.push_back(machine.give(two.order));
+        for (int n = 0; n < 30 && !HasFatalFailure(); ++n) tick();
+        open.push_back(machine.give({Request::kHold, {}, {}}));
+        for (int n = 0; n < 120 && !HasFatalFailure(); ++n) tick();
+        if (HasFatalFailure()) return;
+        EXPECT_TRUE(open.empty()) << open.front();
+        const TickState& s = machine.first();
+        EXPECT_TRUE(s.phase == Phase::kArmed || s.phase == Phase::kParked ||
+                    s.phase == Phase::kReturning)
+            << name(s.phase);
+        if (s.phase == Phase::kArmed) {
+          EXPECT_TRUE(s.motion.x_dot.isZero(0.0));
+        }
+      }
+}
+
+INSTANTIATE_TEST_SUITE_P(Every, OrdersInPhase,
+                         testing::Range(0, static_cast<int>(everyOrder().size())),
+                         [](const auto& test) {
+                           return std::string(
+                               everyOrder()[static_cast<std::size_t>(test.param)].name);
+                         });
+
+// Any segment after any other, which most end at speed.
+TEST(Program, ASegmentGoesOnFromWhereTheOneBeforeItWas) {
+  const char* const kinds[] = {
+      "{move: {to: {x_m: 0.03, gamma_deg: 2}, duration_s: 1.5}}",
+      "{trajectory: {duration_s: 0.7, z: {sine: {amplitude_m: 0.03, frequency_hz: 0.7}}}}",
+      "{trajectory: {duration_s: 0.7, y: {ramp: {to_m: 0.01}}}}",
+      "{admittance: {duration_s: 0.5}}",
+      "{monitor: {duration_s: 1, interval_s: 1}}",
+      "{calibration: {}}",
+      "{path: {rows_m_deg: [[0, 0, 0, 0, 0, 0], [0, 0, 0.0002, 0, 0, 0], [0, 0, 0.0008, 0, 0, 0], "
+      "[0, 0, 0.0018, 0, 0, 0]]}}"};
+  for (const char* one : kinds)
+    for (const char* two : kinds) {
+      const std::string first = one;  // a recorded path begins where it says, and there is one
+      if (std::string(two).find("path") != std::string::npos &&
+          first.find("monitor") == std::string::npos &&
+          first.find("calibration") == std::string::npos)
+        continue;
+      SCOPED_TRACE(std::string(one) + ", " + two);
+      test::ObedientMachine machine(
+          experiment("puma_on_table_4_1", {std::string("program=[") + one + ", " + two + "]"}));
+      machine.rest(20);
+      machine.order(Request::kStart);
+      bool ran = false, ours = false;
+      Vec6 x = Vec6::Zero(), v = Vec6::Zero();
+      for (int n = 0; n < 1500 && machine.first().phase != Phase::kParked; ++n) {
+        machine.tick(Vec6::Unit(2) * 30.0);
+        const TickState& s = machine.first();
+        ASSERT_EQ(s.cause, Check::kCount) << name(s.cause);
+        ASSERT_FALSE(s.aborted);
+        if (ours) {
+          // A sine sets out from rest at 0.03 * 2 pi 0.7 m/s.
+          ASSERT_LT((s.motion.x_dot - v).norm(), 0.14) << "tick " << s.tick;
+          ASSERT_LT((s.motion.x - x - 0.005 * (s.motion.x_dot + v)).norm(), 7e-4)
+              << "tick " << s.tick;
+        }
+        ours = s.command.engaged;
+        ran = ran || s.segment == 1;
+        x = s.motion.x;
+        v = s.motion.x_dot;
+      }
+      EXPECT_TRUE(ran);
+      EXPECT_EQ(machine.first().phase, Phase::kParked);
+      EXPECT_TRUE(x.isZero(0.0));
+    }
 }
 
 }  // namespace
