@@ -11,6 +11,7 @@
 #include "ves/analysis/gate.hpp"
 #include "ves/analysis/loop.hpp"
 #include "ves/evaluation/comparison.hpp"
+#include "ves/evaluation/tool_motion.hpp"
 #include "ves/math/dense.hpp"
 #include "ves/run/run.hpp"
 #include "ves/srms/modes.hpp"
@@ -267,6 +268,16 @@ TEST(LoopModel, DelayOfATickIsALongerLag) {
   const double r = massRatios(loop.base, loop.robot_P)(0), w = 2 * M_PI * after.frequency;
   EXPECT_NEAR(before - after.growth, r * w * w * loop.period / (2 * (1 + r)),
               0.1 * std::abs(before));
+}
+
+TEST(Distance, OfAToolIsThatOfItsPoints) {
+  std::vector<Transform> a(4), b(5);
+  for (std::size_t i = 0; i < 5; ++i) b[i].p = Vec3(1.0, 2.0, 3.0 + static_cast<double>(i));
+  for (std::size_t i = 0; i < 4; ++i) a[i].p = b[i].p + Vec3(0.0, 0.0, 0.01);
+  a[2].p = b[2].p + Vec3(0.03, 0.0, 0.04);
+  const ToolDistance d = distance(a, b);
+  EXPECT_NEAR(d.peak, 0.05, 1e-12);
+  EXPECT_NEAR(d.rms, std::sqrt((3 * 1e-4 + 25e-4) / 4.0), 1e-12);
 }
 
 TEST(Distance, ComparesTwoMotionsAtTheTimesOfTheFirst) {

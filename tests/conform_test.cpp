@@ -59,6 +59,21 @@ TEST(Conform, AGoodMachineKeepsAll) {
     EXPECT_EQ(broken(good, rate), Names());
 }
 
+TEST(Conform, SaysHowManyWereLostAndHowManyWereNotNewer) {
+  SampleJudge judge(setup(), 0);
+  for (const int sequence : {10, 11, 15, 16, 16, 14, 17, 20}) {
+    sample_t m{};
+    m.header = header({42, 5}, sequence, 7'000'000'000 + 2'000'000 * sequence);
+    std::vector<std::uint8_t> bytes(static_cast<std::size_t>(m.getEncodedSize()));
+    m.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+    judge.take(bytes.data(), std::ssize(bytes), 2'000'000 * sequence);
+  }
+  for (const Requirement& r : judge.verdict(50'000'000))
+    if (r.name == "sequence") {  // 12 to 14, 15 and 16 after 14, 18 and 19
+      EXPECT_EQ(r.found, "2 not newer; 7 lost on the way");
+    }
+}
+
 TEST(Conform, WhatIsNotKeptIsNamedAndNothingElse) {
   const auto at = [](int when, const std::function<void(sample_t&)>& spoil) {
     return [=](int i, sample_t& m) {

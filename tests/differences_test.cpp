@@ -40,6 +40,42 @@ TEST(Evidence, IsOfThePoseThatFailed) {
   EXPECT_EQ(evidence(Check::kCount, row, e), "");
 }
 
+TEST(Evidence, NamesTheWorstAndItsKey) {
+  const Experiment e = ramp();
+  const SafetyLimits& l = e.controller.safety;
+  Row row{};
+  // A leg is outside by its length, whichever it is; straight up all are as long.
+  row.state.x[2] = 0.9;
+  const double up = legLengths(e.controller.geometry,
+                               e.controller.geometry.fromHome({{0.0, 0.0, 0.9}, Vec3::Zero()}))(0);
+  EXPECT_EQ(evidence(Check::kActuatorLimits, row, e),
+            fmt::format("leg 1 at {:.4f} m, want [{}, {}] (safety.leg_min_m, leg_max_m)", up,
+                        l.leg_min, l.leg_max));
+  // Rolled it is another leg that is out of its range, and the text says so.
+  row = {};
+  row.state.x[4] = 0.9;
+  const Vec6 L = legLengths(e.controller.geometry,
+                            e.controller.geometry.fromHome({Vec3::Zero(), {0.0, 0.9, 0.0}}));
+  int out = 0;
+  while (L(out) >= l.leg_min && L(out) <= l.leg_max) ++out;
+  ASSERT_LT(out, 6);
+  EXPECT_EQ(evidence(Check::kActuatorLimits, row, e).substr(0, 5), fmt::format("leg {}", out + 1));
+  row = {};
+  row.state.x[4] = -0.6;
+  EXPECT_EQ(evidence(Check::kMotionLimits, row, e).substr(0, 18), "beta at -34.4 deg,");
+  row = {};
+  for (int i = 0; i < 6; ++i) row.state.leg[i] = row.state.leg_measured[i] = 1.5;
+  row.state.leg_measured[3] = 1.45;
+  row.state.leg_measured[1] = 1.53;
+  EXPECT_EQ(evidence(Check::kPositionError, row, e).substr(0, 34),
+            "leg 4 is 50.0 mm from its command ");
+  row.has_sample = true;
+  row.sample.adc[4] = 32767;
+  EXPECT_EQ(evidence(Check::kSensorSaturated, row, e).substr(0, 26), "channel my at 32767 counts");
+  row.sample.adc[6] = static_cast<int>(1.0 / e.plant.sensor.volts_per_count);
+  EXPECT_EQ(evidence(Check::kPressure, row, e).substr(0, 7), "1.00 V,");
+}
+
 TEST(Differences, NameTheLeavesThatWereChanged) {
   const Experiment a = ramp(), b = ramp({"seed=9", "robot.joints_deg_or_m=[0, -80, 90, 0, 0, 0]"}),
                    c = ramp({"safety.translation_m=0.3"});

@@ -13,6 +13,7 @@
 #include "support/rig.hpp"
 #include "support/robots.hpp"
 #include "ves/bus/channels.hpp"
+#include "ves/evaluation/drift_samples.hpp"
 #include "ves/run/replay.hpp"
 #include "ves/run/run.hpp"
 
@@ -255,37 +256,23 @@ TEST(Orders, AreInTheLogAndReplayExactly) {
 TEST(Watch, SixtyFiveHoursFollowTheTemperature) {
   // 4.1.2: a bias of drift times the temperature beside it; 131 looks, 30 minutes apart.
   const Experiment e = experiment("sensor_drift");
-  struct DriftSample {
-    double t = 0.0, n = 0.0;
-    Vec6 mean = Vec6::Zero();
-  };
-  std::vector<DriftSample> looks;
-  const double period = 0.01;
-  std::int64_t begun = -1;
-  const RunResult result = runLockstep(e, nullptr, [&](const TickState& s) {
-    if (s.kind != SegmentKind::kMonitor) return Order();
-    if (begun < 0) begun = s.tick;
-    const auto look = static_cast<std::size_t>((s.tick - begun) / 180'000);
-    if (looks.size() <= look) looks.resize(look + 1);
-    DriftSample& l = looks[look];
-    l.n += 1.0;
-    l.t += (static_cast<double>(s.tick) * period - l.t) / l.n;
-    l.mean += (s.dynamic.stacked() - l.mean) / l.n;
-    return Order();
-  });
-  EXPECT_TRUE(result.good());
-  EXPECT_NEAR(result.simulated, 234001.0, 10.0);
+  const RecordedRun run = recordLockstep(e);
+  EXPECT_TRUE(run.result.good());
+  EXPECT_NEAR(run.result.simulated, 234001.0, 10.0);
+  const std::vector<DriftSample> looks = driftSamples(run.series);
   ASSERT_EQ(looks.size(), 131u);
   const Mat6 C = e.controller.sensor.C_proc;
   const double t0 = looks[0].t;
-  for (const DriftSample& l : looks) {
-    EXPECT_EQ(l.n, 100.0);
-    const auto warmer = [](double t) { return 1.25 * std::sin(2.0 * M_PI * t / 86400.0); };
-    const Vec6 counts = e.plant.sensor.drift / e.plant.sensor.volts_per_count * warmer(l.t);
+  for (std::size_t i = 0; i < looks.size(); ++i) {
+    const DriftSample& l = looks[i];
+    EXPECT_NEAR(l.t - t0, 1800.0 * static_cast<double>(i), 1e-6);
+    const double warmer = 1.25 * std::sin(2.0 * M_PI * l.t / 86400.0);
+    EXPECT_NEAR(l.temperature, e.plant.climate.mean + warmer, 0.01) << i;
+    const Vec6 counts = e.plant.sensor.drift / e.plant.sensor.volts_per_count * warmer;
     const Wrench drift = transfer(e.controller.sensor.X_PS, Wrench::from(C * counts));
     // Two means of 100 correlated samples, each within 4 standard errors of 0.9 counts.
     const double z = 4.0 * 0.9 * M_SQRT2 * std::abs(C(2, 2)) + 0.05;
-    EXPECT_NEAR(l.mean(2) - looks[0].mean(2), drift.f.z(), 2.0 * z) << l.t - t0;
+    EXPECT_NEAR(l.wrench(2) - looks[0].wrench(2), drift.f.z(), 2.0 * z) << l.t - t0;
   }
 }
 
@@ -305,7 +292,7 @@ const std::vector<Named>& everyOrder() {
         order.verdict = {Stability::kStable, Stability::kStable};
       out.push_back({name(request).data(), order});
     }
-    Segment move = segment(SegmentKind::kMove, 1.0);
+    Segment move = segment(SegmentKind::kMove, 3.0);  // gone through over some ticks
     move.target.p = {0.02, 0.0, 0.03};
     Segment watch = segment(SegmentKind::kMonitor, 3.0);
     watch.interval = 1.0;
@@ -345,6 +332,7 @@ TEST_P(OrdersInPhase, AreAnsweredWithoutAJumpAndAHoldEndsThem) {
         std::vector<std::int64_t> open;
         Vec6 x = machine.first().motion.x, v = machine.first().motion.x_dot;
         bool loose = false;  // where the legs are not ours the pose is the measured one
+        bool held = false;   // it rests since a hold
         const auto tick = [&] {
           machine.tick(Vec6::Unit(0) * 10.0);
           const TickState& s = machine.first();
@@ -356,6 +344,12 @@ TEST_P(OrdersInPhase, AreAnsweredWithoutAJumpAndAHoldEndsThem) {
             ASSERT_LT((s.motion.x - x - 0.005 * (s.motion.x_dot + v)).norm(), 5e-4)
                 << "tick " << s.tick;
           }
+          const bool alone = s.request == Request::kNone || s.request == Request::kHold;
+          if (held && alone) {
+            ASSERT_TRUE(s.motion.x_dot.isZero(0.0)) << "tick " << s.tick;
+          }
+          const bool obeyed = s.request == Request::kHold && s.refusal == Refusal::kNone;
+          held = (held || obeyed) && alone && s.motion.x_dot.isZero(0.0);
           loose = !s.command.engaged;
           x = s.motion.x;
           v = s.motion.x_dot;
@@ -430,6 +424,8 @@ TEST(Program, ASegmentGoesOnFromWhereTheOneBeforeItWas) {
       }
       EXPECT_TRUE(ran);
       EXPECT_EQ(machine.first().phase, Phase::kParked);
+      EXPECT_EQ(machine.first().calibration == CalibrationStatus::kDone,
+                (first + two).find("calibration") != std::string::npos);
       EXPECT_TRUE(x.isZero(0.0));
     }
 }

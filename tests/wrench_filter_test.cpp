@@ -24,6 +24,12 @@ TEST(WrenchFilter, TakesTheBandFromWhatIsBeyondIt) {
       EXPECT_EQ(filter.update(componentOf(i, in)).stacked(), Vec6(Vec6::Unit(i) * out)) << in;
     EXPECT_EQ(filter.update(componentOf((i + 1) % 6, 1.0)).stacked(),
               Vec6(Vec6::Unit((i + 1) % 6)));  // each for itself
+    settings.dead_band(i) = 1e-3;
+    EXPECT_TRUE(settings.any());
+    settings.dead_band(i) = 0.0;
+    EXPECT_FALSE(settings.any());
+    settings.low_pass(i) = 1e-3;
+    EXPECT_TRUE(settings.any());
   }
 }
 

@@ -21,7 +21,7 @@ class ObedientMachine {
   explicit ObedientMachine(const Experiment& e)
       : e_(e), counts_per_wrench_(wrenchPerCount(e.controller.sensor, Mat3::Identity()).inverse()) {
     const Geometry& g = e_.controller.geometry;
-    in_.sample.legs = legCounts(e_.controller.legs, legLengths(g, g.fromHome({})));
+    legs_ = legCounts(e_.controller.legs, legLengths(g, g.fromHome({})));
     in_.sample.switches = kAllSwitchesClosed;
     in_.sample.adc[6] = (e_.controller.safety.pressure_min + e_.controller.safety.pressure_max) / 2;
     add();
@@ -33,19 +33,16 @@ class ObedientMachine {
   /// `force` F_Po_I beyond the weight of the tick before, the first joint `q` [rad] from its place.
   void tick(const Vec6& force = Vec6::Zero(), double q = 0.0) {
     Sample& s = in_.sample;
-    s.time = s.legs_time = s.wrench_time = s.joints_time = ++s.sequence * kTick;
-    in_.time = s.time;
-    const Vec6 counts = counts_per_wrench_ * (first().static_wrench.stacked() + force);
-    for (std::size_t i = 0; i < 6; ++i)
-      s.adc[i] = static_cast<std::int32_t>(std::lround(counts(static_cast<Eigen::Index>(i))));
-    s.q = e_.plant.task.initial_joints;
-    s.q(0) += q;
+    in_.time = (in_.tick + 1) * kTick;
+    if (in_.tick % every_ == 0) measure(force, q);
     for (std::size_t i = 0; i < platforms_.size(); ++i) states_[i] = platforms_[i]->tick(in_);
     ++in_.tick;
     in_.order = {};
-    if (first().command.engaged) s.legs = legCounts(e_.controller.legs, first().legs.L);
+    legs_ = first().command.engaged ? legCounts(e_.controller.legs, first().legs.L) : s.legs;
   }
-  void open(std::int32_t switches) { in_.sample.switches = switches; }
+  /// From now on only every so many ticks find a new sample.
+  void sampleEvery(int ticks) { every_ = ticks; }
+  void open(std::uint32_t switches) { in_.sample.switches = switches; }
   void rest(int ticks) {
     for (int i = 0; i < ticks; ++i) tick();
   }
@@ -69,11 +66,25 @@ class ObedientMachine {
   const TickState& last() const { return states_.back(); }
 
  private:
+  void measure(const Vec6& force, double q) {
+    Sample& s = in_.sample;
+    ++s.sequence;
+    s.time = s.legs_time = s.wrench_time = s.joints_time = in_.time;
+    const Vec6 counts = counts_per_wrench_ * (first().static_wrench.stacked() + force);
+    for (std::size_t i = 0; i < 6; ++i)
+      s.adc[i] = static_cast<std::int32_t>(std::lround(counts(static_cast<Eigen::Index>(i))));
+    s.q = e_.plant.task.initial_joints;
+    s.q(0) += q;
+    s.legs = legs_;
+  }
+
   Experiment e_;
   Mat6 counts_per_wrench_;
   std::vector<std::unique_ptr<TestPlatform>> platforms_;
   std::vector<TickState> states_;
   TickInput in_;
+  LegCounts legs_;
+  int every_ = 1;
   std::int64_t given_ = 0;
 };
 
