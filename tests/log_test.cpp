@@ -112,6 +112,32 @@ TEST_F(Log, DamageIsNamedWithItsByte) {
   EXPECT_NE(refusal([&] { LogReader("/no/such.lcmlog"); }).find("no such file"), std::string::npos);
 }
 
+// Whatever there is of it, as many places are told as there were.
+TEST(Damage, IsCountedWhereItIsNotTold) {
+  for (int places = 0; places < 30; ++places) {
+    Damage damage;
+    for (int i = 0; i < places; ++i) damage.add("place " + std::to_string(i));
+    const auto lines = damage.lines();
+    int told = static_cast<int>(lines.size());
+    if (!lines.empty() && lines.back().starts_with("and "))
+      told += std::stoi(lines.back().substr(4)) - 1;
+    EXPECT_EQ(told, places);
+    EXPECT_LE(lines.size(), 12u);
+  }
+}
+
+TEST(Recent, KeepsTheLastThousandsAndNoMore) {
+  Recent<int> recent;
+  for (int i = 0; i < 10'000; ++i) {
+    recent.put(i, 2 * i);
+    recent.put(i, 3 * i);  // said again
+  }
+  ASSERT_TRUE(recent.find(9999));
+  EXPECT_EQ(*recent.find(9999), 3 * 9999);
+  EXPECT_TRUE(recent.find(9000));
+  EXPECT_FALSE(recent.find(1000));
+}
+
 TEST_F(Log, NoDamageEverCrashesTheReader) {
   const std::vector<char> good = bytes();
   std::mt19937 random(1);

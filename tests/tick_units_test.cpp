@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "support/rig.hpp"
+#include "ves/control/mass_belief.hpp"
 #include "ves/control/robot_load.hpp"
 #include "ves/control/safety_monitor.hpp"
 #include "ves/control/sensor_bias.hpp"
@@ -603,6 +604,20 @@ TEST(LegCommander, CarriesWhatRoundingLeavesInAdmittanceControlOnly) {
   }
 }
 
+TEST(LegCommander, WhatRoundingLeftIsNotSentOnceItRests) {
+  ControllerConfig c = puma();
+  c.compensation.observer = true;
+  Sender to(c);
+  const double count = c.legs.scale(0), between = 1.5 + 0.3 * count;
+  for (int n = 0; n < 2; ++n) to.send(moving(between, 0.0), c.periodSeconds());  // 0.6 are owed
+  to.send(moving(between, 0.0), 0.0);
+  EXPECT_EQ(to.commander.command().counts, legCounts(c.legs, to.commander.reference()));
+  for (int n = 0; n < 2; ++n) to.send(moving(between, 0.0), c.periodSeconds());
+  to.commander.hold();
+  to.send(moving(between, 0.0), c.periodSeconds());
+  EXPECT_EQ(to.commander.command().counts, legCounts(c.legs, to.commander.reference()));
+}
+
 // Other memories
 
 TEST(RobotInertia, IsThereFromTheFirstTickOnHoweverSeldomItIsRefreshed) {
@@ -666,6 +681,36 @@ TEST(Rehearsal, LooksAtTheLastPoseWhateverTheStride) {
   for (int tick = 0; rehearsal.underWay() && tick < 100; ++tick)
     rehearsal.advance(checks, c.periodSeconds(), c.path);
   EXPECT_EQ(rehearsal.failure(), Check::kMotionLimits);
+}
+
+// Of one parameter and a bias, by hand: Bayes' rule for normal distributions.
+TEST(MassBelief, IsSharpenedAsNormalDistributionsAre) {
+  constexpr double kOfMass = 0.5, kOfBias = 2.0, kNoise = 0.3, kSeen = 1.7;
+  MassBelief belief;
+  belief.begin(MassVector::Constant(4, kOfMass), 0.0, kOfBias);
+  // Nothing of the masses is in channel 0: what it shows is bias. All that is told counts for 3 %
+  // of itself as noise besides.
+  MassColumns columns = MassColumns::Zero(6, 4);
+  columns(1, 2) = 3.0;
+  Vec6 y = Vec6::Zero(), noise = Vec6::Constant(kNoise * kNoise);
+  y(0) = y(1) = kSeen;
+  belief.learnAtRest(columns, y, noise);
+  const double b2 = kOfBias * kOfBias, m2 = 9.0 * kOfMass * kOfMass, n2 = kNoise * kNoise;
+  EXPECT_NEAR(belief.bias()(0), kSeen * b2 / (1.0009 * b2 + n2), 1e-12);
+  // Channel 1 shows both, by their shares of the variance.
+  const double s = 1.0009 * (m2 + b2) + n2;
+  EXPECT_NEAR(belief.bias()(1), kSeen * b2 / s, 1e-12);
+  EXPECT_NEAR(belief.parameters()(2), kSeen * 3.0 * kOfMass * kOfMass / s, 1e-12);
+  EXPECT_NEAR(belief.covariance()(2, 2),
+              kOfMass * kOfMass - std::pow(3.0 * kOfMass * kOfMass, 2) / s, 1e-12);
+  EXPECT_NEAR(belief.parameters()(0), 0.0, 0.0);
+  EXPECT_NEAR(belief.covariance()(0, 0), kOfMass * kOfMass, 1e-15);
+  belief.moveBias(Vec6::Unit(0) * 0.25);
+  EXPECT_NEAR(belief.bias()(0), kSeen * b2 / (1.0009 * b2 + n2) - 0.25, 1e-12);
+  // Begun again it knows nothing.
+  belief.begin(MassVector::Constant(4, kOfMass), 0.0, kOfBias);
+  EXPECT_TRUE(belief.bias().isZero(0.0));
+  EXPECT_TRUE(belief.parameters().isZero(0.0));
 }
 
 }  // namespace
