@@ -6,6 +6,7 @@
 #include "support/rig.hpp"
 #include "ves/evaluation/differences.hpp"
 #include "ves/evaluation/evidence.hpp"
+#include "ves/evaluation/summary.hpp"
 
 namespace ves {
 namespace {
@@ -74,6 +75,38 @@ TEST(Evidence, NamesTheWorstAndItsKey) {
   EXPECT_EQ(evidence(Check::kSensorSaturated, row, e).substr(0, 26), "channel my at 32767 counts");
   row.sample.adc[6] = static_cast<int>(1.0 / e.plant.sensor.volts_per_count);
   EXPECT_EQ(evidence(Check::kPressure, row, e).substr(0, 7), "1.00 V,");
+}
+
+TEST(Summary, HasEachNumberOfARunUnderItsOwnName) {
+  Series series;
+  series.experiment = ramp();
+  RunResult result;
+  result.ticks = 11;
+  result.simulated = 12.5;
+  result.wall = 2.5;
+  result.phase = Phase::kStopped;
+  result.cause = Check::kVelocity;
+  result.cause_tick = 13;
+  result.lost = 14;
+  result.log_lost = 15;
+  result.log_trouble = "no room";
+  result.malformed = 16;
+  const auto out = summarise(series, result);
+  EXPECT_EQ(out.at("ticks"), 11);
+  EXPECT_EQ(out.at("simulated_s"), 12.5);
+  EXPECT_EQ(out.at("wall_s"), 2.5);
+  EXPECT_EQ(out.at("real_time_factor"), 5.0);
+  EXPECT_EQ(out.at("ended"), "stopped");
+  EXPECT_EQ(out.at("first_cause"), "velocity");
+  EXPECT_EQ(out.at("first_cause_tick"), 13);
+  EXPECT_EQ(out.at("messages_lost"), 14);
+  EXPECT_EQ(out.at("log_events_lost"), 15);
+  EXPECT_EQ(out.at("log_trouble"), "no room");
+  EXPECT_EQ(out.at("messages_malformed"), 16);
+  EXPECT_EQ(out.at("seed"), series.experiment.plant.seed);
+  EXPECT_EQ(out.at("configuration_hash"), series.experiment.source.hash);
+  result.wall = 0.0;
+  EXPECT_EQ(summarise(series, result).at("real_time_factor"), 0.0);
 }
 
 TEST(Differences, NameTheLeavesThatWereChanged) {

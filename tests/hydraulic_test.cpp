@@ -593,5 +593,41 @@ TEST(HydraulicPlant, CompensatedWithARobotIsTheIdealOneWhereItIsStiffAndNoLoadSh
   }
 }
 
+TEST(HydraulicPlant, ATransducersNoiseAndHysteresisAreThoseOfItsModel) {
+  const auto rig = [](const std::string& set) {
+    return test::Rig(experiment("z_sine", {"legs.model=hydraulic", set}));
+  };
+  constexpr double kNoise = 3e-4, kHysteresis = 1e-3;  // [m]
+  test::Rig noisy = rig("legs.hydraulic.reading_noise_m=3.0e-4");
+  const double count = experiment("z_sine", {}).plant.transducer.scale;
+  noisy.run(10);
+  double sum = 0.0, squares = 0.0;
+  constexpr int kTicks = 1500;
+  for (int n = 0; n < kTicks; ++n) {
+    noisy.tick();
+    const double off = noisy.state().L_measured(2) - noisy.plant().truth().legs.L(2);
+    sum += off / kTicks;
+    squares += off * off / kTicks;
+  }
+  const double rms = std::sqrt(squares - sum * sum),
+               want = std::hypot(kNoise, count / std::sqrt(12));
+  EXPECT_NEAR(rms, want, 0.08 * want);  // four standard errors
+  EXPECT_NEAR(sum, 0.0, 0.1 * kNoise);
+
+  test::Rig loose = rig("legs.hydraulic.reading_hysteresis_m=1.0e-3");
+  loose.arm();
+  const auto restedAt = [&](double z) {
+    Segment move = test::segment(SegmentKind::kMove, 2.0);
+    move.target.p.z() = z;
+    loose.order(Request::kRun, move);
+    loose.until(Phase::kArmed);
+    loose.run(300);
+    return loose.state().L_measured(0) - loose.plant().truth().legs.L(0);
+  };
+  const double from_below = restedAt(0.05), from_above = restedAt(0.0);
+  EXPECT_NEAR(from_below, -0.5 * kHysteresis, 2.0 * count);  // the magnet is left behind
+  EXPECT_NEAR(from_above, 0.5 * kHysteresis, 2.0 * count);
+}
+
 }  // namespace
 }  // namespace ves::plant
