@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // The run-time switch of the mutation build, included by every file with mutants: VES_MUTANT=N turns
-// the N-th deliberate error on. With VES_MUTANT_COVERAGE=FILE a process appends the numbers of the
-// mutants that it passed.
+// the N-th deliberate error on. With VES_MUTANT_COVERAGE=FILE processes mark in it, a byte a mutant,
+// which they passed; however they end.
 #pragma once
 
-#include <cstdio>
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
 #include <cstdlib>
 
 namespace ves_mutation {
@@ -15,19 +18,16 @@ inline constexpr int kMost = 20000;
 struct State {
   State() {
     if (const char* number = std::getenv("VES_MUTANT")) active = std::atoi(number);
-    coverage = std::getenv("VES_MUTANT_COVERAGE");
-  }
-  ~State() {
-    if (!coverage) return;
-    if (std::FILE* out = std::fopen(coverage, "a")) {
-      for (int i = 0; i < kMost; ++i)
-        if (seen[i]) std::fprintf(out, "%d\n", i);
-      std::fclose(out);
-    }
+    const char* coverage = std::getenv("VES_MUTANT_COVERAGE");
+    const int file = coverage ? open(coverage, O_RDWR | O_CREAT | O_CLOEXEC, 0666) : -1;
+    if (file < 0 || ftruncate(file, kMost) != 0) return;
+    void* map = mmap(nullptr, kMost, PROT_READ | PROT_WRITE, MAP_SHARED, file, 0);
+    close(file);
+    if (map != MAP_FAILED) seen = static_cast<char*>(map);
   }
   int active = 0;
-  const char* coverage = nullptr;
-  bool seen[kMost] = {};
+  char nowhere[kMost] = {};
+  char* seen = nowhere;
 };
 inline State state;
 
@@ -35,7 +35,7 @@ inline State state;
 
 /// Whether mutant `id` is the active one.
 inline bool ves_m(int id) noexcept {
-  ves_mutation::state.seen[id] = true;
+  if (char* const seen = ves_mutation::state.seen) seen[id] = 1;  // else it begins before all else
   return ves_mutation::state.active == id;
 }
 /// A factor: 1, or `other` in the mutant.

@@ -164,7 +164,7 @@ def cover(test):
                           env=environment(VES_MUTANT_COVERAGE=str(file)), cwd=BUILD / "tests",
                           stdin=subprocess.DEVNULL, capture_output=True, text=True)
     seconds = time.monotonic() - start
-    seen = sorted({int(n) for n in file.read_text().split()}) if file.exists() else []
+    seen = [n for n, byte in enumerate(file.read_bytes()) if byte] if file.exists() else []
     return {"binary": binary, "name": name, "seconds": seconds, "seen": seen,
             "status": done.returncode}
 
