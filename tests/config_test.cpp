@@ -322,6 +322,18 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"path_of_a_slip", "z_sine",
             "program=[{path: {rows_m_deg: [[0, 0, 0, 0, 0, 0]], rows_m: 1}}]",
             "rows_m: unknown key"},
+        Bad{"path_that_leaps", "z_sine",
+            "program=[{path: {rows_m_deg: [[0, 0, 0, 0, 0, 0], [0, 0, 0.001, 0, 0, 0], [0, 0, "
+            "0.05, 0, 0, 0]]}}]",
+            "program[0].path.rows_m_deg: row 3: the velocity check would stop the run"},
+        Bad{"path_in_millimetres", "z_sine",
+            "program=[{path: {rows_m_deg: [[0, 0, 400, 0, 0, 0]]}}]",
+            "rows_m_deg: row 1: the motion limits check would stop the run"},
+        Bad{"path_from_elsewhere", "z_sine",
+            "program=[{move: {to: {z_m: 0.1}}}, {calibration: {}}, {path: {rows_m_deg: [[0, 0, 0, "
+            "0, "
+            "0, 0]]}}]",
+            "program[2].path.rows_m_deg: begins elsewhere than the segment before it ends"},
         Bad{"two_paths", "z_sine",
             "program=[{path: {rows_m_deg: [[0, 0, 0, 0, 0, 0]]}}, {path: {rows_m_deg: [[0, 0, 0, "
             "0, 0, 0]]}}]",

@@ -274,6 +274,7 @@ Experiment build(const Value& document, AskedKey* asked = nullptr) {
   }
 
   readProgram(root, out);
+  requirePathFits(root, c);
   requireGroundFits(root, c);
   requireFrameFits(root, c, p.task);
   if (const std::string proposal = proposeExcitation(root, c); !proposal.empty())

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Vehicles that this platform cannot show, refused before it moves.
+// Vehicles and recorded paths that this platform cannot show, refused before it moves.
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "readers.hpp"
 #include "ves/control/path_checks.hpp"
@@ -36,6 +37,46 @@ void requireGroundFits(Section& root, const ControllerConfig& c) {
                                 "{:.1f} deg, and the {} check would stop the run; want less of it",
                                 i * kStep, x.p.x(), x.p.y(), x.p.z(), x.rpy.x() / kDegree,
                                 x.rpy.y() / kDegree, x.rpy.z() / kDegree, name(t.first())));
+  }
+}
+
+/// Row by row, and from where the segment before it ends, where that is known.
+void requirePathFits(Section& root, const ControllerConfig& c) {
+  if (c.path.cols() == 0) return;
+  const auto refuse = [&](const std::string& why) {
+    for (Section& item : root.list("program"))
+      if (item.has("path")) item.section("path").fail("rows_m_deg", why);
+  };
+  std::optional<Vec6> before;
+  for (int i = 0; i < c.program.size; ++i) {
+    const Segment& s = c.program.segments[static_cast<std::size_t>(i)];
+    if (s.kind == SegmentKind::kPath) break;
+    if (s.kind == SegmentKind::kMove)
+      before = s.target.stacked();
+    else if (s.kind == SegmentKind::kTrajectory || s.kind == SegmentKind::kAdmittance)
+      before.reset();
+  }
+  const PathChecks checks(c.safety, c.geometry);
+  const double period = c.periodSeconds();
+  const auto lengths = [&](const Vec6& x) {
+    return legLengths(c.geometry, c.geometry.fromHome(Pose::from(x)));
+  };
+  if (before)
+    if (const Tripped t = checks.step(lengths(c.path.col(0)), lengths(*before), period); t.any())
+      refuse(
+          fmt::format("begins elsewhere than the segment before it ends: the {} check would "
+                      "stop the run; want a move to its first row before it",
+                      name(t.first())));
+  for (Eigen::Index k = 0; k < c.path.cols(); ++k) {
+    const Pose x = Pose::from(c.path.col(k));
+    const Vec6 L = lengths(c.path.col(k));
+    Tripped t = checks.pose(c.geometry.fromHome(x), x, L);
+    if (k > 0) t = t | checks.step(L, lengths(c.path.col(k - 1)), period);
+    if (t.any())
+      refuse(
+          fmt::format("row {}: the {} check would stop the run; want less of it, or more rows "
+                      "for the same way",
+                      k + 1, name(t.first())));
   }
 }
 
