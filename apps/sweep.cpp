@@ -5,6 +5,7 @@
 
 #include "commands.hpp"
 #include "runner.hpp"
+#include "ves/config/keys.hpp"
 #include "ves/sweep/sweep.hpp"
 
 namespace ves::app {
@@ -29,6 +30,24 @@ std::string duration(double seconds) {
   if (seconds < 100.0) return fmt::format("{:.0f} s", seconds);
   if (seconds < 6000.0) return fmt::format("{:.0f} min", seconds / 60.0);
   return fmt::format("{:.1f} h", seconds / 3600.0);
+}
+
+/// Whether the scenario's readers take nothing but whole numbers for a key.
+bool takesOnlyWhole(const std::string& key, const std::string& scenario,
+                    const std::vector<std::string>& sets) {
+  Value document = loadDocument(scenario);
+  for (const std::string& set : sets) applyOverride(document, set);
+  AskedKey all;
+  askKeys(document, all);
+  const AskedKey* at = &all;
+  for (std::size_t from = 0; from <= key.size();) {
+    const std::size_t end = std::min(key.find('.', from), key.size());
+    const auto next = at->keys.find(key.substr(from, end - from));
+    if (next == at->keys.end()) return false;
+    at = &next->second;
+    from = end + 1;
+  }
+  return at->kinds == AskedKey::kInteger;
 }
 
 }  // namespace
@@ -91,6 +110,8 @@ int sweepCommand(int argc, char** argv) {
       throw InputError("--until: looks at rows one after the other, want one process");
     if (until > 0.0 && design != SweepDesign::kUniform)
       throw InputError("--until: fewer runs are no such design, want --design uniform");
+    plan.drawWhole(
+        [&](const std::string& key) { return takesOnlyWhole(key, options.scenario, sets); });
     // What is wrong with the first and the last is told before hours have passed.
     for (const std::int64_t run : {std::int64_t{0}, plan.size() - 1}) {
       std::vector<std::string> all = sets;

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "support/programs.hpp"
+#include "support/refusal.hpp"
 #include "support/robots.hpp"
 #include "ves/sweep/sweep.hpp"
 
@@ -79,6 +80,31 @@ TEST(SweepPlan, DrawsAreUniformAndOfTheSeedAndTheRunAlone) {
   EXPECT_NEAR(mean, 1.0, 0.06);   // five deviations of a mean of so many
   EXPECT_NEAR(square, 3.0, 0.1);  // 6^2 / 12
   EXPECT_NEAR(product, 0.0, 0.11);
+}
+
+TEST(SweepPlan, DrawsWholeNumbersWithBothEndsWhereNothingElseIsTaken) {
+  SweepPlan plan;
+  plan.draw("seed=3:6");
+  plan.draw("plant_mismatch.mass=1:2");
+  plan.repeat(4000);
+  plan.drawWhole([](const std::string& key) { return key == "seed"; });
+  std::map<std::string, int> seen;
+  int between = 0;
+  for (std::int64_t run = 0; run < plan.size(); ++run) {
+    const auto set = plan.overrides(run);
+    ++seen[set[0]];
+    between += set[1].find('.') != std::string::npos ? 1 : 0;
+  }
+  EXPECT_EQ(seen.size(), 4u);
+  for (const auto& [one, times] : seen) EXPECT_NEAR(times, 1000, 120) << one;  // 4 deviations
+  EXPECT_TRUE(seen.count("seed=3") && seen.count("seed=6"));
+  EXPECT_GT(between, 3900);
+  SweepPlan fraction;
+  fraction.draw("seed=1:2.5");
+  EXPECT_NE(test::refusal([&] {
+              fraction.drawWhole([](const std::string&) { return true; });
+            }).find("whole"),
+            std::string::npos);
 }
 
 TEST(SweepPlan, RefusesByName) {
@@ -323,6 +349,17 @@ TEST_F(Sweep, KnowsNothingOfAFigureThatFewRunsHave) {
   EXPECT_EQ(rows(folder_ / "s/sweep.csv").size(), 150u);
   EXPECT_NE(o.text.find("of 0 runs; 150 have none"), std::string::npos) << o.text;
   EXPECT_NE(o.text.find("not within 1: want more --runs"), std::string::npos) << o.text;
+}
+
+TEST_F(Sweep, DrawsOfAKeyOfWholeNumbersAreWhole) {
+  const std::string still = "free_decay --set 'program=[{move: {to: {x_m: 0.001}}}]' --runs 12 ";
+  const test::Output o = sweep(still + "--draw legs.K_P=9000:9003 --draw seed=1:9" + out("s"));
+  ASSERT_EQ(o.status, 0) << o.text;
+  for (const auto& row : rows(folder_ / "s/sweep.csv")) {
+    EXPECT_EQ(row.at("ended"), "parked");
+    EXPECT_EQ(row.at("legs.K_P").find('.'), std::string::npos) << row.at("legs.K_P");
+  }
+  EXPECT_EQ(sweep(still + "--draw seed=1:9.5" + out("r")).status, 2);
 }
 
 TEST_F(Sweep, RowIsWhatRunSaysOfTheSameValues) {

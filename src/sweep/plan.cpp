@@ -102,6 +102,18 @@ void SweepPlan::draw(const std::string& option) {
   drawn_.push_back(d);
 }
 
+void SweepPlan::drawWhole(const std::function<bool(const std::string& key)>& takes_only_whole) {
+  for (Drawn& d : drawn_) {
+    if (!takes_only_whole(d.key)) continue;
+    if (d.from != std::floor(d.from) || d.to != std::floor(d.to))
+      throw InputError(
+          fmt::format("--draw '{}={}:{}': the key takes whole numbers only, want whole "
+                      "ends",
+                      d.key, d.from, d.to));
+    d.whole = true;
+  }
+}
+
 std::int64_t SweepPlan::size() const {
   constexpr double kMost = 1e9;
   double product = static_cast<double>(draws_);
@@ -124,7 +136,8 @@ std::string SweepPlan::text() const {
       fmt::format("{} runs, {} of each combination, seed {}\n", size(), draws_, seed_);
   for (const Varied& v : varied_)
     out += fmt::format("vary {}={}\n", v.key, fmt::join(v.values, ","));
-  for (const Drawn& d : drawn_) out += fmt::format("draw {}={}:{}\n", d.key, d.from, d.to);
+  for (const Drawn& d : drawn_)
+    out += fmt::format("draw {}={}:{}{}\n", d.key, d.from, d.to, d.whole ? ", whole" : "");
   if (design_ == SweepDesign::kLatin) out += "a Latin hypercube\n";
   if (design_ == SweepDesign::kSobol) out += "Sobol's points\n";
   return out;
@@ -173,7 +186,9 @@ std::vector<std::string> SweepPlan::overrides(std::int64_t run) const {
   const auto number = static_cast<std::uint64_t>(run);
   for (std::size_t i = 0; i < drawn_.size(); ++i) {
     const Drawn& d = drawn_[i];
-    out.push_back(fmt::format("{}={}", d.key, d.from + (d.to - d.from) * share(run, i)));
+    const double x = share(run, i), value = d.whole ? std::floor(d.from + (d.to - d.from + 1.0) * x)
+                                                    : d.from + (d.to - d.from) * x;
+    out.push_back(fmt::format("{}={}", d.key, value));
   }
   if (keys().size() > out.size())
     out.push_back(fmt::format(

@@ -25,6 +25,9 @@ class SweepPlan {
   void vary(const std::string& option);
   /// "KEY=FROM:TO", uniform in between, another one each run. Throws InputError.
   void draw(const std::string& option);
+  /// Draws of the keys that take nothing else are whole numbers, both ends as likely as what is
+  /// between. Throws InputError where an end is none.
+  void drawWhole(const std::function<bool(const std::string& key)>& takes_only_whole);
   /// Runs of each combination, each with a noise seed of its own unless `seed` is varied.
   void repeat(std::int64_t draws) { draws_ = draws; }
   void seed(std::uint64_t seed) { seed_ = seed; }
@@ -49,6 +52,7 @@ class SweepPlan {
   struct Drawn {
     std::string key;
     double from = 0.0, to = 0.0;
+    bool whole = false;
   };
   double share(std::int64_t run, std::size_t key) const;  // [-] of a key's range
 
