@@ -3,6 +3,7 @@
 // Exit statuses, messages, files, two processes.
 #include "support/programs.hpp"
 
+#include <fcntl.h>
 #include <set>
 
 namespace ves {
@@ -294,9 +295,15 @@ TEST_F(Programs, ThoseWhoNameAPrivateBusAreOnOneNetworkAndNobodyElse) {
   EXPECT_EQ(on("a", network), there + "\n");
   EXPECT_EQ(on("a", network), there + "\n");
   EXPECT_NE(on("b", network), there + "\n");
+  // Its network is gone with the last of them. Held open, its number is not given to another.
+  std::string process;
+  std::ifstream(folder_ / "ves" / "a") >> process;
+  const int held = ::open(("/proc/" + process + "/ns/net").c_str(), O_RDONLY);
+  ASSERT_GE(held, 0);
   first.signal(SIGKILL);
   first.wait();
-  EXPECT_NE(on("a", network), there + "\n");  // gone with the last; its number may be another's now
+  EXPECT_NE(on("a", network), there + "\n");
+  close(held);
   // Whose number somebody in another network has now is not here.
   std::ofstream(folder_ / "ves" / "c") << getpid() << " 1\n";
   EXPECT_NE(on("c", network), outside);
