@@ -10,6 +10,35 @@
 #include "ves/control/path_checks.hpp"
 
 namespace ves {
+namespace {
+
+/// A platform that goes from one pose about home to the next.
+class Walk {
+ public:
+  /// A pose takes `period` [s].
+  Walk(const ControllerConfig& c, double period) : checks_(c.safety, c.geometry), period_(period) {}
+
+  void beginAt(const Vec6& x) { last_ = legLengths(geometry(), pose(x)); }
+  /// What would stop it at x, or on the way there.
+  Tripped go(const Vec6& x) {
+    const Transform X_IP = pose(x);
+    const Vec6 L = legLengths(geometry(), X_IP);
+    Tripped t = checks_.pose(X_IP, Pose::from(x), L);
+    if (!t.any() && last_) t = checks_.step(L, *last_, period_);
+    last_ = L;
+    return t;
+  }
+
+ private:
+  const Geometry& geometry() const { return checks_.geometry(); }
+  Transform pose(const Vec6& x) const { return geometry().fromHome(Pose::from(x)); }
+
+  PathChecks checks_;
+  double period_;             // [s]
+  std::optional<Vec6> last_;  // [m] legs
+};
+
+}  // namespace
 
 /// As long as the program asks for it, and within what the platform may do.
 void requireGroundFits(Section& root, const ControllerConfig& c) {
@@ -22,15 +51,10 @@ void requireGroundFits(Section& root, const ControllerConfig& c) {
         "ground", fmt::format("its recording lasts {:.4g} s, and admittance control {:.4g} s; want "
                               "a longer one, or less of the program",
                               ground.lasts(), longest));
-  const PathChecks checks(c.safety, c.geometry);
-  Vec6 last = Vec6::Zero();
+  Walk walk(c, kStep);
   for (int i = 0; i * kStep <= longest; ++i) {
     const Pose x = Pose::from(ground.at(i * kStep).x);
-    const Transform X_IP = c.geometry.fromHome(x);
-    const Vec6 L = legLengths(c.geometry, X_IP);
-    Tripped t = checks.pose(X_IP, x, L);
-    if (!t.any() && i > 0) t = checks.step(L, last, kStep);
-    last = L;
+    const Tripped t = walk.go(x.stacked());
     if (t.any())
       root.section("base").fail(
           "ground", fmt::format("after {:.2f} s it is at {:.3f} {:.3f} {:.3f} m, {:.1f} {:.1f} "
@@ -56,27 +80,21 @@ void requirePathFits(Section& root, const ControllerConfig& c) {
     else if (s.kind == SegmentKind::kTrajectory || s.kind == SegmentKind::kAdmittance)
       before.reset();
   }
-  const PathChecks checks(c.safety, c.geometry);
-  const double period = c.periodSeconds();
-  const auto lengths = [&](const Vec6& x) {
-    return legLengths(c.geometry, c.geometry.fromHome(Pose::from(x)));
-  };
-  if (before)
-    if (const Tripped t = checks.step(lengths(c.path.col(0)), lengths(*before), period); t.any())
+  Walk walk(c, c.periodSeconds());
+  if (before) walk.beginAt(*before);
+  for (Eigen::Index k = 0; k < c.path.cols(); ++k) {
+    const Tripped t = walk.go(c.path.col(k));
+    if (!t.any()) continue;
+    const std::string_view check = name(t.first());
+    if (k == 0 && (t.has(Check::kVelocity) || t.has(Check::kFlow)))
       refuse(
           fmt::format("begins elsewhere than the segment before it ends: the {} check would "
                       "stop the run; want a move to its first row before it",
-                      name(t.first())));
-  for (Eigen::Index k = 0; k < c.path.cols(); ++k) {
-    const Pose x = Pose::from(c.path.col(k));
-    const Vec6 L = lengths(c.path.col(k));
-    Tripped t = checks.pose(c.geometry.fromHome(x), x, L);
-    if (k > 0) t = t | checks.step(L, lengths(c.path.col(k - 1)), period);
-    if (t.any())
-      refuse(
-          fmt::format("row {}: the {} check would stop the run; want less of it, or more rows "
-                      "for the same way",
-                      k + 1, name(t.first())));
+                      check));
+    refuse(
+        fmt::format("row {}: the {} check would stop the run; want less of it, or more rows "
+                    "for the same way",
+                    k + 1, check));
   }
 }
 
