@@ -32,14 +32,17 @@ std::string duration(double seconds) {
   return fmt::format("{:.1f} h", seconds / 3600.0);
 }
 
-/// Whether the scenario's readers take nothing but whole numbers for a key.
-bool takesOnlyWhole(const std::string& key, const std::string& scenario,
-                    const std::vector<std::string>& sets) {
+/// What the scenario's readers ask of its keys.
+AskedKey askedOf(const std::string& scenario, const std::vector<std::string>& sets) {
   Value document = loadDocument(scenario);
   for (const std::string& set : sets) applyOverride(document, set);
-  AskedKey all;
-  askKeys(document, all);
-  const AskedKey* at = &all;
+  AskedKey asked;
+  askKeys(document, asked);
+  return asked;
+}
+
+bool takesOnlyWhole(const AskedKey& asked, const std::string& key) {
+  const AskedKey* at = &asked;
   for (std::size_t from = 0; from <= key.size();) {
     const std::size_t end = std::min(key.find('.', from), key.size());
     const auto next = at->keys.find(key.substr(from, end - from));
@@ -110,8 +113,10 @@ int sweepCommand(int argc, char** argv) {
       throw InputError("--until: looks at rows one after the other, want one process");
     if (until > 0.0 && design != SweepDesign::kUniform)
       throw InputError("--until: fewer runs are no such design, want --design uniform");
-    plan.drawWhole(
-        [&](const std::string& key) { return takesOnlyWhole(key, options.scenario, sets); });
+    if (!draw.empty())
+      plan.drawWhole([asked = askedOf(options.scenario, sets)](const std::string& key) {
+        return takesOnlyWhole(asked, key);
+      });
     // What is wrong with the first and the last is told before hours have passed.
     for (const std::int64_t run : {std::int64_t{0}, plan.size() - 1}) {
       std::vector<std::string> all = sets;

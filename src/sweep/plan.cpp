@@ -186,8 +186,10 @@ std::vector<std::string> SweepPlan::overrides(std::int64_t run) const {
   const auto number = static_cast<std::uint64_t>(run);
   for (std::size_t i = 0; i < drawn_.size(); ++i) {
     const Drawn& d = drawn_[i];
-    const double x = share(run, i), value = d.whole ? std::floor(d.from + (d.to - d.from + 1.0) * x)
-                                                    : d.from + (d.to - d.from) * x;
+    const double x = share(run, i);
+    double value = d.from + (d.to - d.from) * x;
+    // A share may be rounded to one.
+    if (d.whole) value = std::min(d.to, std::floor(d.from + (d.to - d.from + 1.0) * x));
     out.push_back(fmt::format("{}={}", d.key, value));
   }
   if (keys().size() > out.size())
