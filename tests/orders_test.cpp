@@ -261,10 +261,18 @@ TEST(Watch, SixtyFiveHoursFollowTheTemperature) {
   EXPECT_NEAR(run.result.simulated, 234001.0, 10.0);
   const std::vector<DriftSample> looks = driftSamples(run.series);
   ASSERT_EQ(looks.size(), 131u);
+  std::vector<int> samples(looks.size());
+  std::int64_t begun = -1;
+  for (const Row& row : run.series.rows) {
+    if (row.state.kind != static_cast<int>(SegmentKind::kMonitor)) continue;
+    if (begun < 0) begun = row.state.header.sequence;
+    ++samples.at(static_cast<std::size_t>((row.state.header.sequence - begun) / 180'000));
+  }
   const Mat6 C = e.controller.sensor.C_proc;
   const double t0 = looks[0].t;
   for (std::size_t i = 0; i < looks.size(); ++i) {
     const DriftSample& l = looks[i];
+    EXPECT_EQ(samples[i], 100);
     EXPECT_NEAR(l.t - t0, 1800.0 * static_cast<double>(i), 1e-6);
     const double warmer = 1.25 * std::sin(2.0 * M_PI * l.t / 86400.0);
     EXPECT_NEAR(l.temperature, e.plant.climate.mean + warmer, 0.01) << i;
@@ -287,9 +295,11 @@ const std::vector<Named>& everyOrder() {
       const auto request = static_cast<Request>(i);
       if (request == Request::kRun) continue;
       Order order{request, {}, {}};
-      if (request == Request::kVehicle)
-        order.vehicle.to.mass = 2.0, order.vehicle.over = 0.5,
+      if (request == Request::kVehicle) {
+        order.vehicle.to.mass = 2.0;
+        order.vehicle.over = 0.5;
         order.verdict = {Stability::kStable, Stability::kStable};
+      }
       out.push_back({name(request).data(), order});
     }
     Segment move = segment(SegmentKind::kMove, 3.0);  // gone through over some ticks

@@ -4,6 +4,7 @@
 #include "support/programs.hpp"
 
 #include <fcntl.h>
+
 #include <set>
 
 namespace ves {

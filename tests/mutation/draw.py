@@ -319,8 +319,8 @@ def find(module):
     whole = SOURCE / "src" / module / "whole_module.cpp"
     text = "".join(f'#include "{path}"\n' for path in finders)
     flags = ["-xc++", "-std=c++20", f"-I{SOURCE}/include", f"-I{whole.parent}", "-I/usr/include/eigen3",
-             f"-I{ROOT}/build/release/lcmtypes", f"-I{ROOT}/build/release/src/generated", "-DEIGEN_MAX_ALIGN_BYTES=16", "-DFMT_SHARED",
-             "-include", "optional", "-ferror-limit=0",
+             f"-I{ROOT}/build/release/lcmtypes", f"-I{ROOT}/build/release/src/generated",
+             "-DEIGEN_MAX_ALIGN_BYTES=16", "-DFMT_SHARED", "-include", "optional", "-ferror-limit=0",
              "-isystem", "/usr/lib/llvm-14/lib/clang/14.0.6/include"]
     unit = ci.Index.create().parse(str(whole), args=flags, unsaved_files=[(str(whole), text)])
     fatal = [d for d in unit.diagnostics if d.severity >= 4]  # clang 14 is stricter than g++ here and there

@@ -235,9 +235,13 @@ def noticed(record, binary, names, allowed):
 
 
 def known_results():
-    """What earlier runs found, by key_of()."""
+    """What earlier runs found, by key_of(); of mutants that are alike, the one that survived."""
     file = WORK / "results.json"
-    return {key_of(r): r for r in json.loads(file.read_text())} if file.exists() else {}
+    known = {}
+    for result in json.loads(file.read_text()) if file.exists() else []:
+        if key_of(result) not in known or not result["killed_by"]:
+            known[key_of(result)] = result
+    return known
 
 
 def run(args):
