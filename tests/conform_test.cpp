@@ -179,19 +179,7 @@ TEST_F(ConformProgram, OurOwnPlantKeepsAllAndMoves) {
 }
 
 /// Somebody's machine in Python: our template, and one that does one thing wrong.
-class PythonMachine : public ConformProgram {
- protected:
-  static Process python(const std::string& script, std::vector<std::string> arguments,
-                        const std::string& loss = "0") {
-    const std::string source = VES_TEST_SOURCE_DIR;
-    setenv("PYTHONPATH",
-           (source + "/tests/support/python:" + VES_TEST_APP_DIR + "/../python").c_str(), 1);
-    setenv("PYTHONDONTWRITEBYTECODE", "1", 1);
-    setenv("VES_TEST_LOSS", loss.c_str(), 1);
-    arguments.insert(arguments.begin(), source + "/" + script);
-    return {"/usr/bin/python3", arguments};
-  }
-};
+using PythonMachine = ConformProgram;
 
 TEST_F(PythonMachine, TheTemplateKeepsAllAndMoves) {
   enterPrivateBus();

@@ -51,6 +51,22 @@ TEST(Command, TrajectoryTakesEachCoordinateInMillimetresAndDegrees) {
   for (std::size_t i : {0u, 1u, 3u, 4u}) EXPECT_EQ(s.trajectory.motion[i], AxisMotion::kHold);
 }
 
+TEST(Command, ThrustersAreThoseOfTheVehicle) {
+  const Experiment hold = loadExperiment(test::configDir() + "/scenarios/satellite_hold.yaml");
+  const Command one = parseCommand("thrust 0.5 0", hold);
+  EXPECT_EQ(one.order.request, Request::kThrust);
+  EXPECT_EQ(one.order.thrust, ThrustOrder(0.5 * ThrustOrder::Unit(0)));
+  const auto said = [&](const std::string& line, const Experiment& e) {
+    return test::refusal([&] { parseCommand(line, e); });
+  };
+  EXPECT_NE(said("thrust 0.5 1", hold).find("thruster: '1', want a number in [0, 0]"),
+            std::string::npos);
+  EXPECT_NE(said("thrust 0.5 0 0", hold).find("thruster 0: given twice"), std::string::npos);
+  EXPECT_NE(said("thrust 0 0", hold).find("seconds: '0'"), std::string::npos);
+  EXPECT_NE(said("thrust 1", hold).find("thruster: missing"), std::string::npos);
+  EXPECT_NE(said("thrust 1 0", puma()).find("the vehicle has no thrusters"), std::string::npos);
+}
+
 TEST(Command, MoveRobotAndCollect) {
   const Command v = parseCommand("vehicle in 2 stiffness 3 mass 0.5", puma());
   EXPECT_EQ(v.order.request, Request::kVehicle);

@@ -64,6 +64,22 @@ TEST(NoHeapInFlight, FromArmingToParking) {
                   "environment.target.velocity_m_per_s=[2.98, 0, 0]"}));
 }
 
+TEST(NoHeapInFlight, WhileThrustersFireByOrders) {
+  const Experiment e = experiment("satellite_hold");
+  Lockstep loop(e.controller, e.plant);
+  Order fire{Request::kThrust, {}, {}};
+  fire.thrust(0) = 0.1;
+  loop.step({Request::kStart, {}, {}});
+  while (loop.step().kind != SegmentKind::kAdmittance) {
+  }
+  unsigned fired = 0;
+  test::MallocGuard guard;
+  for (int i = 0; i < 300; ++i) fired |= loop.step(i % 30 == 10 ? fire : Order{}).thrust.on;
+  const std::int64_t calls = guard.count();
+  EXPECT_EQ(calls, 0);
+  EXPECT_TRUE(fired & 1U);
+}
+
 /// Every kind of order, taken and refused: their paths are gone through inside the tick.
 TEST(NoHeapInOrders, ThroughEveryOrder) {
   Lockstep loop(experiment("puma_on_table_4_1", {kCompensated}).controller,

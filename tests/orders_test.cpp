@@ -300,6 +300,7 @@ const std::vector<Named>& everyOrder() {
         order.vehicle.over = 0.5;
         order.verdict = {Stability::kStable, Stability::kStable};
       }
+      if (request == Request::kThrust) order.thrust(0) = 0.1;
       out.push_back({name(request).data(), order});
     }
     Segment move = segment(SegmentKind::kMove, 3.0);  // gone through over some ticks

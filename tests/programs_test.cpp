@@ -7,6 +7,9 @@
 
 #include <set>
 
+#include "ves/evaluation/comparison.hpp"
+#include "ves/series/series.hpp"
+
 namespace ves {
 namespace {
 
@@ -193,6 +196,29 @@ TEST_F(Programs, RealTimeRunOfTwoProcesses) {
   EXPECT_EQ(s["ended"], "parked");
   EXPECT_NEAR(s["z_peak_to_peak_m"].get<double>(), 0.04, 1e-3);
   EXPECT_TRUE(s.contains("wake_up_late_median_s"));
+}
+
+// The example of a flight controller: in Python, in a process of its own, over the bus.
+TEST_F(Programs, AFlightControllerHoldsASatelliteThatTurns) {
+  enterPrivateBus();
+  double most = 0.0;  // [rad]
+  untilNothingIsLost([&] {
+    Process pilot = python("apps/examples/attitude.py", {"--foresight", "2"});
+    const Output o =
+        run("satellite_jets --no-plots " + patient() +
+            " --set 'program=[{calibration: {}}, {admittance: {duration_s: 8}}]'" + out("a"));
+    EXPECT_EQ(o.status, 0) << o.text;
+    EXPECT_EQ(pilot.wait(), 0);
+    return (folder_ / "a/run.lcmlog").string();
+  });
+  const Series series = readSeries((folder_ / "a/run.lcmlog").string());
+  for (const Row& row : series.rows)
+    if (inAdmittance(row.state))
+      most = std::max(most, Vec6::Map(row.state.x).tail<3>().cwiseAbs().maxCoeff());
+  // Left alone it turns by 4.8 degrees about x.
+  EXPECT_LT(most, 2.5 * kDegree);
+  EXPECT_GT(firingsOf(series).size(), 3U);
+  EXPECT_LT(summary(folder_ / "a")["emulation_error_attitude_share"].get<double>(), 0.01);
 }
 
 TEST_F(Programs, AStopLeavesItsLastSecondsAsALog) {

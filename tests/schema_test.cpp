@@ -243,6 +243,9 @@ std::set<std::string> everTold() {
     for (std::size_t i = 0; i < now.size(); ++i)
       if (now[i].second != before[i].second) told.insert(now[i].first);
   };
+  std::string jets;
+  for (int i = 0; i < kMostThrusters; ++i)
+    jets += std::string(i ? ", " : "") + "{at_m: [0.1, 0, 0], force_n: [0, 0, 0.1]}";
   std::int64_t orders = 0;
   const auto run = [&](Lockstep& loop, int ticks) {
     for (int i = 0; i < ticks; ++i) look(loop.step());
@@ -292,6 +295,14 @@ std::set<std::string> everTold() {
   {  // a laboratory that flies along
     Lockstep loop = loopOf("satellite_tumbling", {});
     order(loop, Request::kStart, 500);
+  }
+  {  // a vehicle that floats, its thrusters on by schedule, orders and attitude hold
+    Lockstep loop = loopOf("satellite_hold", {"base.free.thrusters=[" + jets + "]"});
+    order(loop, Request::kStart, 600);
+    Order fired{Request::kThrust, {}, {7, ++orders}};
+    fired.thrust.setConstant(0.5);
+    look(loop.step(fired));
+    run(loop, 20);
   }
   {  // calibrations, a monitor segment, refusals and a trip, ticks missed, a node that conflicts
     Lockstep loop = loopOf("puma_on_table_4_1", {});
@@ -350,6 +361,9 @@ TEST(Schema, EveryFieldHasItsColumnsWithTheirUnits) {
   Compensation& compensation = e.controller.compensation;
   compensation.aided = compensation.adaptation = compensation.learns_masses = true;
   e.controller.moving_frame.enabled = true;
+  FreeBodyModel floats;
+  floats.propulsion.size = kMostThrusters;
+  e.controller.vehicle = floats;
   Row row;
   row.state = toMessage(filled<TickState>(), header({1, 2}, 3, 4));
   const std::vector<Column> all = columns(e);

@@ -224,6 +224,7 @@ std::optional<Order> fromMessage(const operator_t& m) noexcept {
     order.controller = m.controller;
     if (order.request == Request::kVehicle)
       order.vehicle = {{m.vehicle_mass, m.vehicle_damping, m.vehicle_stiffness}, m.vehicle_over};
+    if (order.request == Request::kThrust) order.thrust = ThrustOrder::Map(m.thrust);
   }
   order.id = {m.header.source, m.header.sequence};
   return ifPlausible(order);

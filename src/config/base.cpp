@@ -230,7 +230,7 @@ Thruster readThruster(Section s) {
   out.p_PoT_P = s.vector("at_m", 3, -100.0, 100.0);
   out.force_P = s.vector("force_n", 3, -1e5, 1e5);
   if (!(out.force_P.norm() > 0.0)) s.fail("force_n", "no force, want a direction of it");
-  const double least = s.has("least_on_s") ? s.number("least_on_s", 0.0, 100.0) : 0.0;
+  if (s.has("least_on_s")) out.least_on = s.number("least_on_s", 0.0, 100.0);
   if (s.has("firings_s")) {
     const Eigen::MatrixXd rows = s.matrix("firings_s", -1, 2, 0.0, kLongest);
     if (rows.rows() > Thruster::kMostFirings)
@@ -238,9 +238,9 @@ Thruster readThruster(Section s) {
              fmt::format("{} of them, want at most {}", rows.rows(), Thruster::kMostFirings));
     for (Eigen::Index i = 0; i < rows.rows(); ++i) {
       const Firing one = firingOf(s, "firings_s", rows, i);
-      if (!(one.until - one.from >= least - 1e-9))
+      if (!(one.until - one.from >= out.least_on - 1e-9))
         s.fail("firings_s", fmt::format("[{}, {}] is shorter than least_on_s of {}", one.from,
-                                        one.until, least));
+                                        one.until, out.least_on));
       out.firings[static_cast<std::size_t>(out.size++)] = one;
     }
   }
@@ -293,8 +293,8 @@ Base readFree(Section& s) {
     free.orbit.rate = kDegree * section.number("orbital_rate_deg_per_s", 0.0, 1.0);
   if (section.has("thrusters"))
     for (Section one : section.list("thrusters")) {
-      if (free.propulsion.size == Thruster::kMost)
-        section.fail("thrusters", fmt::format("more than {}", Thruster::kMost));
+      if (free.propulsion.size == kMostThrusters)
+        section.fail("thrusters", fmt::format("more than {}", kMostThrusters));
       free.propulsion.thrusters[static_cast<std::size_t>(free.propulsion.size++)] =
           readThruster(one);
     }

@@ -154,6 +154,25 @@ VehicleOrder vehicle(Words& words) {
   return order;
 }
 
+/// "0.5 0 3": two thrusters for half a second.
+ThrustOrder thrust(Words& words, const Propulsion& propulsion) {
+  if (propulsion.size == 0) throw InputError("the vehicle has no thrusters");
+  const double seconds = words.number("seconds", 1e-3, kLongestThrust, "s");
+  ThrustOrder order = ThrustOrder::Zero();
+  do {
+    const double number = words.number("thruster", 0, propulsion.size - 1, "(the first is 0)");
+    const int at = static_cast<int>(number);
+    if (static_cast<double>(at) != number)
+      throw InputError(fmt::format("thruster: '{}', want a whole number", number));
+    if (order(at) > 0.0) throw InputError(fmt::format("thruster {}: given twice", at));
+    if (const double least = propulsion.thrusters[static_cast<std::size_t>(at)].least_on;
+        !(seconds >= least))
+      throw InputError(fmt::format("thruster {} is on for at least {} s", at, least));
+    order(at) = seconds;
+  } while (!words.empty());
+  return order;
+}
+
 RobotMove robotMove(Words& words, const Experiment& experiment) {
   const std::vector<std::string>& names = experiment.robot.joint_names;
   const std::string joint = words.word("joint");
@@ -276,6 +295,8 @@ const std::vector<Item>& menu() {
       {Verb::kVehicle, "vehicle", "[in SECONDS] [mass|damping|stiffness FACTOR]...",
        "another vehicle: times the scenario's"},
       {Verb::kGripper, "gripper", "", "it has closed or opened: learn what it holds"},
+      {Verb::kThrust, "thrust", "SECONDS THRUSTER...",
+       "of a vehicle that floats, on from now; from 0"},
       {Verb::kWait, "wait", "SECONDS", "nothing, for so long"},
       {Verb::kHelp, "help", "", "this list"},
       {Verb::kQuit, "quit", "", "home, let go, end"},
@@ -337,6 +358,10 @@ void parseArguments(Words& words, const Experiment& experiment, Command& command
       order.vehicle = vehicle(words);
       break;
     case Verb::kGripper: order.request = Request::kGripper; break;
+    case Verb::kThrust:
+      order.request = Request::kThrust;
+      order.thrust = thrust(words, propulsionOf(experiment.controller.vehicle));
+      break;
     case Verb::kStop:
     case Verb::kQuit: order.request = Request::kStop; break;
     case Verb::kRobot: command.robot = robotMove(words, experiment); break;

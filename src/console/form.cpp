@@ -50,6 +50,10 @@ class Form {
               between(kLeastVehicleFactor, kMostVehicleFactor, "times"));
         }
         break;
+      case Verb::kThrust:
+        add("seconds", "1", kSeconds);
+        add("thrusters, from 0", "0");
+        break;
       case Verb::kGrasp: add("kg", "1", between(0.0, 1e6, "kg")); break;
       case Verb::kCollect:
         add("file", "collected.csv");

@@ -31,6 +31,7 @@ std::string_view name(Request request) noexcept {
     case Request::kOvertaken: return "overtaken";
     case Request::kVehicle: return "vehicle";
     case Request::kGripper: return "gripper";
+    case Request::kThrust: return "thrust";
     case Request::kCount: break;
   }
   return "unknown";
@@ -53,6 +54,9 @@ std::string_view name(Refusal refusal) noexcept {
     case Refusal::kOvertaken: return "a hold, a stop or a failing check came before it";
     case Refusal::kTooLong: return "the loop grows slowly, and would grow too much in that time";
     case Refusal::kTooFast: return "a mode of that vehicle would be too fast for the period";
+    case Refusal::kNoSuchPart: return "the vehicle has no such springs, dampers or thrusters";
+    case Refusal::kTooShort: return "shorter than the thruster can be on";
+    case Refusal::kNotEmulated: return "no vehicle is emulated now";
     case Refusal::kNotLearning: return "masses are not learnt, or the robot has no tool";
     case Refusal::kCount: break;
   }

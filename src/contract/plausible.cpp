@@ -95,6 +95,10 @@ bool plausible(const VehicleOrder& order) {
   return inRange(order.over, 0.0, kMaxOrderTime);
 }
 
+bool plausible(const ThrustOrder& order) {
+  return within(order, kLongestThrust) && order.minCoeff() >= 0.0 && order.sum() > 0.0;
+}
+
 }  // namespace
 
 bool plausible(const Sample& s) noexcept {
@@ -121,6 +125,7 @@ bool plausible(const Order& order) noexcept {
   if (!known(request) || request == Request::kNone || request == Request::kOvertaken) return false;
   if (order.id.sequence < 0) return false;
   if (request == Request::kVehicle) return plausible(order.vehicle);
+  if (request == Request::kThrust) return plausible(order.thrust);
   if (request != Request::kRun) return true;
   const Segment& s = order.segment;
   const bool takes_time = s.kind == SegmentKind::kTrajectory || s.kind == SegmentKind::kAdmittance;

@@ -42,10 +42,6 @@ void AdmittanceControl::begin(const Vec6& x, const Mat6& M_1, double age, double
   energy_.reset();
 }
 
-bool AdmittanceControl::affords(const VehicleOrder& order) const noexcept {
-  return !(inertia_ || model_.coupled()) || model_.affords(change_.ordered(order));
-}
-
 void AdmittanceControl::change(const VehicleOrder& order, bool emulated) noexcept {
   change_.begin(order, model_);
   if (!emulated) change_.finish(model_);

@@ -58,6 +58,7 @@ Refusal Supervisor::obey(const Order& order, const Situation& now, Actuation act
       if (!ours()) return Refusal::kNotArmed;
       act.carried.moveGripper();
       return Refusal::kNone;
+    case Request::kThrust: return ours() ? act.motion.fire(order.thrust) : Refusal::kNotArmed;
     case Request::kReset: return reset(act);
   }
   return Refusal::kNone;
@@ -159,7 +160,8 @@ Refusal Supervisor::compensate(bool in, const Situation& now, Actuation act) noe
 Refusal Supervisor::changeVehicle(const Order& order, const Situation& now,
                                   Actuation act) noexcept {
   if (!ours()) return Refusal::kNotArmed;
-  if (!act.motion.admittance().affords(order.vehicle)) return Refusal::kTooFast;
+  const Refusal refusal = act.motion.admittance().refuses(order.vehicle);
+  if (refusal != Refusal::kNone) return refusal;
   const std::optional<VehicleVerdict> before = changed_;
   changed_ = order.verdict;
   const Refusal unstable = refusesLoop(now.config, act.share.wanted(), HUGE_VAL);

@@ -178,6 +178,8 @@ const TickState& TestPlatform::report(const TickInput& in, const Wrenches& W) no
   state_.request_verdict = in.order.verdict;
   state_.vehicle = motion_.admittance().vehicle();
   state_.vehicle_energy = motion_.admittance().vehicleChange().energy();
+  state_.thrust =
+      state_.kind == SegmentKind::kAdmittance ? motion_.admittance().thrust() : Thrust{};
   state_.envelope_scale = motion_.admittance().scale();
   const EnergyAccount& energy = motion_.admittance().energy();
   state_.energy_put_in = energy.putIn();

@@ -140,11 +140,13 @@ Vec6 restOf(const ModalModel& base, const Vec6& x) {
 
 std::optional<Motion> baseMotion(const Experiment& e, const Vec6& start,
                                  ReferenceMotions& references,
-                                 const std::vector<TimedAction>* pushes) {
+                                 const std::vector<TimedAction>* pushes,
+                                 const std::vector<OrderedFiring>& firings) {
   if (!wantsAdmittance(e.controller.program)) return {};
   std::int64_t duration = 0;
   Interaction interaction = interactionOf(e, duration);
   interaction.start = start;
+  interaction.firings = firings;
   if (pushes) {
     std::erase_if(interaction.actions,
                   [](const TimedAction& one) { return std::holds_alternative<Push>(one.action); });
@@ -194,13 +196,39 @@ std::vector<TimedAction> pushesOf(const Series& series) {
   return told.list();
 }
 
+bool firesByOrder(const state_t& s) noexcept {
+  return std::any_of(std::begin(s.thrust_left), std::end(s.thrust_left),
+                     [](double left) { return left > 0.0; });
+}
+
+std::vector<OrderedFiring> firingsOf(const Series& series) {
+  constexpr double kSame = 1e-9;  // [s]
+  std::vector<OrderedFiring> out;
+  std::array<std::size_t, kMostThrusters> last{};  // of each in `out`, from 1
+  eachTick(series, [&](const Row& row, double) {
+    const state_t& s = row.state;
+    for (std::size_t i = 0; i < last.size(); ++i) {
+      if (!(s.thrust_left[i] > 0.0)) continue;
+      const double until = s.vehicle_time + s.thrust_left[i];
+      if (last[i] > 0 && out[last[i] - 1].on.until > s.vehicle_time - kSame) {
+        out[last[i] - 1].on.until = until;  // it goes on, or another order came
+      } else {
+        out.push_back({static_cast<int>(i), {std::max(0.0, s.vehicle_time), until}});
+        last[i] = out.size();
+      }
+    }
+  });
+  return out;
+}
+
 std::optional<Emulation> emulation(const Series& series, ReferenceMotions& references) {
   if (!whyNotCompared(series).empty()) return {};
   Emulation out;
   out.platform = actual(series);
   if (out.platform.x.size() < 2) return {};
   const std::vector<TimedAction> pushes = pushesOf(series);
-  const auto base = baseMotion(series.experiment, commanded(series).x.front(), references, &pushes);
+  const auto base = baseMotion(series.experiment, commanded(series).x.front(), references, &pushes,
+                               firingsOf(series));
   if (!base) return {};
   out.base = series.experiment.controller.moving_frame.enabled ? shown(series, *base) : *base;
   return out;

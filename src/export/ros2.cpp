@@ -181,7 +181,7 @@ class McapExport::Impl {
       base_segment_ = state.segment;
       base_ = baseMotion(experiment_, Vec6::Map(state.x_desired), references_);
     }
-    if (!ofConfiguredVehicle(state) || state.segment != base_segment_ ||
+    if (!ofConfiguredVehicle(state) || firesByOrder(state) || state.segment != base_segment_ ||
         state.phase != static_cast<int>(Phase::kRunning))
       base_.reset();
   }

@@ -3,7 +3,7 @@
 const UP = new THREE.Vector3(0, 1, 0);  // of three.js's cylinders
 const AHEAD = new THREE.Vector3(0, 0, 1);
 const SOLID = {plate: 0x6b7885, cylinder: 0x8d99a6, axes: 0x333333};
-const ROBOT = 0xe0903a, WORLD = 0x5b8c6a, GHOST = 0x7a5cc0;
+const ROBOT = 0xe0903a, WORLD = 0x5b8c6a, GHOST = 0x7a5cc0, NOZZLE = 0x444444, PLUME = 0xff9d2e;
 const ARROWS = {wrench: 0xc1121f, contact: 0x0a7d5a, push: 0x1f5fbf};
 const TRAIL = 10;  // [s]
 
@@ -46,6 +46,12 @@ class Bodies {
       this.arrows[name] = new Arrow(colour, Math.min(1, recording.scene.size));
       this.root.add(this.arrows[name]);
     }
+    this.plumes = (recording.scene.thrusters || []).map(one => {
+      const jet = new Jet(new THREE.Vector3(...one.force), 0.5 * Math.min(1, recording.scene.size));
+      jet.position.set(...one.at);
+      this.frames.platform.add(jet);
+      return jet.plume;
+    });
     // White booms between dark joints, as the Shuttle's arm has them.
     const part = (geometry, colour) => {
       const mesh = new THREE.Mesh(geometry, new THREE.MeshStandardMaterial(
@@ -113,6 +119,7 @@ class Bodies {
     this.placeLegs(i);
     this.root.updateMatrixWorld(true);
     this.placeArrows(i, show.newtonsPerMetre, size);
+    this.plumes.forEach((plume, k) => { plume.visible = (r.scalar(i, 'thrusters_on') >> k & 1) === 1; });
     const points = r.scene.arm.map((p, k) =>
       new THREE.Vector3(...p).addScaledVector(new THREE.Vector3(...r.bent(i, k)), show.times));
     this.armJoints.forEach((mesh, k) => {
@@ -208,6 +215,22 @@ class Arrow extends THREE.Group {
     this.quaternion.setFromUnitVectors(UP, way.clone().normalize());
     this.shaft.scale.y = Math.max(1e-6, length - 0.5 * this.head);
     this.cone.position.y = length - 0.5 * this.head;
+  }
+}
+
+/** A thruster that pushes with `force`: its nozzle, and what comes out of it the other way. */
+class Jet extends THREE.Group {
+  constructor(force, size) {
+    super();
+    const part = (geometry, material) => {
+      const mesh = new THREE.Mesh(geometry, material);
+      this.add(mesh);
+      return mesh;
+    };
+    part(new THREE.CylinderBufferGeometry(0.02 * size, 0.05 * size, 0.1 * size, 16), new THREE.MeshStandardMaterial({color: NOZZLE}));
+    this.plume = part(new THREE.ConeBufferGeometry(0.06 * size, 0.4 * size, 16).rotateX(Math.PI).translate(0, -0.25 * size, 0),
+                      new THREE.MeshBasicMaterial({color: PLUME, transparent: true, opacity: 0.7}));
+    this.quaternion.setFromUnitVectors(UP, force.normalize());
   }
 }
 

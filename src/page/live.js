@@ -60,6 +60,7 @@ class Live {
     element('stop').hidden = false;
     element('touch').hidden = !data.scene.simulated;
     element('paces').hidden = true;
+    for (const id of ['damping', 'stiffness']) element(id).parentElement.hidden = data.scene.floats;
     for (const [on, known] of [['tool', bodies[0].frames.tool], ['target', data.scene.target]])
       document.querySelector(`#pushed [value=${on}]`).hidden = !known;
     play(true);

@@ -174,7 +174,7 @@ void LiveRun::followBase(const state_t& state) {
     const auto base = computing_.get();
     if (let_go_ && let_go_->computed) base_ = base;
   }
-  if (let_go_ && !ofConfiguredVehicle(state)) let_go_->changed = true;
+  if (let_go_ && (!ofConfiguredVehicle(state) || firesByOrder(state))) let_go_->changed = true;
   if (let_go_ && let_go_->changed) base_.reset();
 }
 

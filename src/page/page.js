@@ -2,6 +2,7 @@
 const stage = new Stage();
 let first = null, bodies = [], live = null, shown = 0;
 const charts = new Charts(element('charts'), t => { play(false); show(first.at(t)); });
+const COUPLES = 16;  // bit of the first in thrusters_on
 const nameOf = (list, i) => first.scene[list][Math.round(i)] || '';
 
 /** A line where picture i begins something. */
@@ -53,6 +54,8 @@ function show(i) {
   if (live) lines.push(...live.lines(shown));
   if (bodies[0].frames.compass)
     lines.push(`the laboratory flies along: ${first.scalar(shown, 'flown').toFixed(2)} m from its start, turning at ${first.scalar(shown, 'turns_at').toFixed(1)} deg/s`);
+  const couples = ['x', 'y', 'z'].filter((_, k) => first.scalar(shown, 'thrusters_on') >> COUPLES + k & 1);
+  if (couples.length) lines.push(`couples about ${couples.join(', ')} hold the attitude`);
   const arrows = Object.keys(ARROWS).filter(name => bodies[0].arrows[name].visible);
   if (arrows.length) lines.push(`${arrows.join(', ')}: 1 m is ${newtonsPerMetre < 10 ? newtonsPerMetre.toFixed(1) : Math.round(newtonsPerMetre)} N`);
   if (how.times > 1) lines.push(`every motion times ${how.times}`);

@@ -170,7 +170,9 @@ Scene::Scene(const Experiment& e)
     addPush(fmt::format("push_f{}", coordinate(i).name),
             [i](const truth_t& m) { return m.push_force[i]; });
   }
+  addThrusters(propulsionOf(e.controller.vehicle));
   description_["emulates"] = wantsAdmittance(program);
+  description_["floats"] = std::holds_alternative<FreeBodyModel>(e.controller.vehicle.kind);
   description_["simulated"] = e.machine.simulated();
   description_["target"] = target_.has_value();
 
@@ -190,6 +192,18 @@ Scene::Scene(const Experiment& e)
   description_["segments"] = segments;
   description_["kinds"] = kinds;
   description_["checks"] = checks;
+}
+
+/// Each where it is, from the platform, and its force; and which are on.
+void Scene::addThrusters(const Propulsion& propulsion) {
+  description_["thrusters"] = Json::array();
+  if (!propulsion.any()) return;
+  for (int i = 0; i < propulsion.size; ++i) {
+    const Thruster& one = propulsion.thrusters[static_cast<std::size_t>(i)];
+    description_["thrusters"].push_back({{"at", json(one.p_PoT_P)}, {"force", json(one.force_P)}});
+  }
+  scalars_.push_back(
+      {"thrusters_on", [](const Row& r) { return static_cast<double>(r.state.thrusters_on); }});
 }
 
 /// The frame in which the vehicle is emulated, as the laboratory flies through it; and its axes

@@ -139,6 +139,7 @@ class Replayer {
       if (known.id.source != order.id.source || known.id.sequence != order.id.sequence) continue;
       order.segment = known.segment;
       order.vehicle = known.vehicle;
+      order.thrust = known.thrust;
       order.controller = known.controller;
       return order;
     }

@@ -189,6 +189,7 @@ std::pair<std::string, std::string> part(schema::Along along, std::string_view u
       return {fmt::format("{}_{}", bodies[static_cast<std::size_t>(i / 3)].name, "xyz"[i % 3]),
               ending(unit)};
     case kAxes: return {std::string(1, "xyz"[i]), ending(unit)};
+    case kThrusters: return {fmt::format("thruster_{}", i), ending(unit)};
     case kTurn: return {fmt::format("r{}{}", i / 3 + 1, i % 3 + 1), ""};
     default: return {fmt::format("leg{}", i + 1), ending(own)};
   }
@@ -196,6 +197,7 @@ std::pair<std::string, std::string> part(schema::Along along, std::string_view u
 
 /// Every field of a state: a column a number, enumerations and sets by their names.
 void addState(const Experiment& e, std::vector<Column>& out) {
+  const Propulsion propulsion = propulsionOf(e.controller.vehicle);
   const std::set<std::string_view> hidden = [&] {
     std::set<std::string_view> h;
     if (!e.controller.compensation.aided) h.insert("reaction");
@@ -204,6 +206,7 @@ void addState(const Experiment& e, std::vector<Column>& out) {
     if (!e.controller.compensation.learns_masses)
       h.insert(
           {"learnt_mass", "learnt_mass_deviation", "learnt_moment", "learnt_moment_deviation"});
+    if (!propulsion.any()) h.insert({"vehicle_time", "thrust_left", "thrusters_on"});
     if (!e.controller.moving_frame.enabled)
       h.insert({"laboratory_time_ns", "laboratory_p", "laboratory_R", "laboratory_v",
                 "laboratory_w", "laboratory_a", "laboratory_alpha"});
@@ -223,10 +226,11 @@ void addState(const Experiment& e, std::vector<Column>& out) {
     if (hidden.contains(field.name)) return;
     if constexpr (std::is_array_v<M>) {
       const bool of_bodies = field.along == schema::Along::kBodies;
-      const int size = of_bodies ? static_cast<int>(bodies.size())
-                       : field.along == schema::Along::kBodyAxes
-                           ? 3 * static_cast<int>(bodies.size())
-                           : static_cast<int>(std::extent_v<M>);
+      const int size =
+          of_bodies                                  ? static_cast<int>(bodies.size())
+          : field.along == schema::Along::kBodyAxes  ? 3 * static_cast<int>(bodies.size())
+          : field.along == schema::Along::kThrusters ? propulsion.size
+                                                     : static_cast<int>(std::extent_v<M>);
       for (int i = 0; i < size; ++i) {
         const auto [name, unit] = part(field.along, field.unit, i, bodies);
         out.push_back({fmt::format("{}_{}{}{}", name, field.column, unit.empty() ? "" : "_", unit),

@@ -131,6 +131,7 @@ void ModalEquations::whole(const RidingRobot& robot, const VectorXd& y, MatrixXd
 FreeBodyEquations::FreeBodyEquations(const FreeBodyModel& model, const Interaction& interaction,
                                      const InteractionOptions& options)
     : model_(model),
+      ordered_(interaction.firings),
       p_IH_(interaction.p_IH),
       start_(interaction.start),
       mass_(model.body_P.mass + lockedRobot(interaction.payload, interaction.q0).mass),
@@ -198,7 +199,8 @@ void FreeBodyEquations::begin(const RidingRobot& robot, std::int64_t step, const
   const BodyMotion P = platform(robot, y);
   pulses_ =
       pulsesOf(model_.propulsion.hold, pulses_, rotationVector(P.X.R), P.X.R.transpose() * P.w);
-  pushed_P_ = thrust(model_.propulsion, pulses_, static_cast<double>(step) * step_, step_);
+  pushed_P_ =
+      firings(model_.propulsion, pulses_, ordered_, static_cast<double>(step) * step_, step_).mean;
   pulses_ = spent(pulses_, step_);
 }
 

@@ -88,6 +88,7 @@ class FreeBodyEquations {
   Eigen::VectorXd stateOf(const RidingRobot& robot, const BodyMotion& P) const;
 
   const FreeBodyModel& model_;
+  const std::vector<OrderedFiring>& ordered_;
   Vec3 p_IH_;
   Vec6 start_;
   double mass_;                  // [kg] at the start

@@ -8,6 +8,11 @@ ModalModel linearised(const VehicleModel& model) {
   return linearised(std::get<FreeBodyModel>(model.kind));
 }
 
+Propulsion propulsionOf(const VehicleModel& model) noexcept {
+  const auto* free = std::get_if<FreeBodyModel>(&model.kind);
+  return free ? free->propulsion : Propulsion{};
+}
+
 AdmittanceModel::AdmittanceModel(const VehicleModel& model, double period)
     : kind_([&] {
         if (const auto* free = std::get_if<FreeBodyModel>(&model.kind))

@@ -135,6 +135,8 @@ void FreeBody::reset(const Vec6& x, const Mat6& M_1, double ahead) noexcept {
   now_.time = ahead > 0.0 ? -ahead : 0.0;
   along_.setZero();
   now_.pulses = {};
+  for (int i = 0; i < kMostThrusters; ++i) now_.ordered[static_cast<std::size_t>(i)] = {i, {}};
+  thrust_ = {};
   if (ahead > 0.0 && !(velocity(s).isZero(0.0) && model_.orbit.rate == 0.0))
     s = advanced(whole_, whole_, s, {}, -ahead, model_.orbit);
 }
@@ -147,6 +149,9 @@ void FreeBody::step(const Wrench& F_Po_I, const CarriedBody& carried, double dt,
                     double damping) noexcept {
   before_ = now_;
   dt_ = dt;
+  thrust_.time = now_.time;
+  for (int i = 0; i < kMostThrusters; ++i)
+    thrust_.left(i) = std::max(0.0, now_.ordered[static_cast<std::size_t>(i)].on.until - now_.time);
   const RigidState& from = before_.rigid;
   const Mat6 own = massInP();
   const Gyrostat before{own + rotated(carried.R_IP_before.transpose(), carried.before),
@@ -162,18 +167,22 @@ void FreeBody::step(const Wrench& F_Po_I, const CarriedBody& carried, double dt,
     const Mat3 R_PI = from.R_IP.transpose();
     if (now_.time >= 0.0)
       now_.pulses = pulsesOf(jets.hold, now_.pulses, rotationVector(from.R_IP), R_PI * from.w);
-    const auto thrust_I = [&](double t, double over, double turned_for) {
-      return rotate(rotationOf(turned_for * from.w) * from.R_IP,
-                    thrust(jets, now_.pulses, t, over));
+    const auto fires = [&](double t, double over) {
+      return firings(jets, now_.pulses, now_.ordered, t, over);
     };
-    const Wrench pushed = thrust_I(now_.time, dt, 0.5 * dt);
+    const auto inI = [&](const Wrench& F_P, double turned_for) {
+      return rotate(rotationOf(turned_for * from.w) * from.R_IP, F_P);
+    };
+    const Firings fired = fires(now_.time, dt);
+    const Wrench pushed = inI(fired.mean, 0.5 * dt);
     F = F + pushed;
+    thrust_.on = fired.on;
     now_.pulses = spent(now_.pulses, dt);
     now_.time += dt;
     after.h_P = wheels(now_.time);
     pushed_ = pushed.stacked();
     if (dt > 0.0) pushed_.tail<3>() -= from.R_IP * (after.h_P - before.h_P) / dt;
-    F_ahead = F_ahead + thrust_I(now_.time, ahead, dt + 0.5 * ahead);
+    F_ahead = F_ahead + inI(fires(now_.time, ahead).mean, dt + 0.5 * ahead);
   }
   const Orbit& orbit = model_.orbit;
   if (orbit.rate != 0.0) {  // what it puts into the vehicle alone
@@ -200,6 +209,20 @@ void FreeBody::step(const Wrench& F_Po_I, const CarriedBody& carried, double dt,
     now_ = before_;
     step(F_Po_I, carried, dt, ahead, 0.0);
   }
+}
+
+Refusal FreeBody::fire(const ThrustOrder& order) noexcept {
+  const Propulsion& jets = model_.propulsion;
+  for (int i = 0; i < kMostThrusters; ++i) {
+    if (!(order(i) > 0.0)) continue;
+    if (i >= jets.size) return Refusal::kNoSuchPart;
+    if (!(order(i) >= jets.thrusters[static_cast<std::size_t>(i)].least_on))
+      return Refusal::kTooShort;
+  }
+  const double from = std::max(0.0, now_.time);
+  for (int i = 0; i < kMostThrusters; ++i)
+    if (order(i) > 0.0) now_.ordered[static_cast<std::size_t>(i)].on = {from, from + order(i)};
+  return Refusal::kNone;
 }
 
 BodyMotion FreeBody::coasting() const noexcept {

@@ -44,22 +44,47 @@ Pulses spent(const Pulses& pulses, double dt) noexcept {
   return out;
 }
 
-Wrench thrust(const Propulsion& propulsion, const Pulses& pulses, double t, double dt) noexcept {
-  Wrench sum;
-  if (!(dt > 0.0)) return sum;
+void Firings::add(const Wrench& F_P, double share, int bit) noexcept {
+  constexpr double kNone = 1e-9;  // [-] that rounding leaves
+  if (!(share > kNone)) return;
+  mean = mean + Wrench::from(share * F_P.stacked());
+  on |= 1u << static_cast<unsigned>(bit);
+}
+
+namespace {
+
+Firing both(const Firing& a, const Firing& b) noexcept {
+  return {std::max(a.from, b.from), std::min(a.until, b.until)};
+}
+
+double length(const Firing& one) noexcept { return std::max(0.0, one.until - one.from); }
+
+}  // namespace
+
+Firings firings(const Propulsion& propulsion, const Pulses& pulses,
+                std::span<const OrderedFiring> ordered, double t, double dt) noexcept {
+  Firings out;
+  if (!(dt > 0.0)) return out;
+  const Firing window{t, t + dt};
   for (int i = 0; i < propulsion.size; ++i) {
     const Thruster& thruster = propulsion.thrusters[static_cast<std::size_t>(i)];
-    double fires = 0.0;  // [s]
-    for (int k = 0; k < thruster.size; ++k) {
-      const Firing& one = thruster.firings[static_cast<std::size_t>(k)];
-      fires += std::max(0.0, std::min(one.until, t + dt) - std::max(one.from, t));
+    const std::span schedule(thruster.firings.data(), static_cast<std::size_t>(thruster.size));
+    double on = 0.0;  // [s]
+    for (const Firing& one : schedule) on += length(both(one, window));
+    for (const OrderedFiring& order : ordered) {
+      if (order.thruster != i) continue;
+      const Firing more = both(order.on, window);
+      on += length(more);
+      for (const Firing& one : schedule) on -= length(both(one, more));
     }
-    const Vec3 force = fires / dt * thruster.force_P;
-    sum = sum + Wrench{force, thruster.p_PoT_P.cross(force)};
+    out.add({thruster.force_P, thruster.p_PoT_P.cross(thruster.force_P)}, on / dt, i);
   }
-  for (int i = 0; i < 3; ++i)
-    sum.n(i) += pulses.sense(i) * propulsion.hold.torque_P(i) * (std::min(pulses.left(i), dt) / dt);
-  return sum;
+  for (int i = 0; i < 3; ++i) {
+    Wrench couple;
+    couple.n(i) = pulses.sense(i) * propulsion.hold.torque_P(i);
+    out.add(couple, std::min(pulses.left(i), dt) / dt, kMostThrusters + i);
+  }
+  return out;
 }
 
 }  // namespace ves

@@ -75,6 +75,17 @@ class Programs : public testing::Test {
     arguments.insert(arguments.begin(), name);
     return {std::string(VES_TEST_APP_DIR) + "/ves", arguments};
   }
+  /// A script in the source tree; of what it sends a share of `loss` never arrives.
+  static Process python(const std::string& script, std::vector<std::string> arguments,
+                        const std::string& loss = "0") {
+    const std::string source = VES_TEST_SOURCE_DIR;
+    setenv("PYTHONPATH",
+           (source + "/tests/support/python:" + VES_TEST_APP_DIR + "/../python").c_str(), 1);
+    setenv("PYTHONDONTWRITEBYTECODE", "1", 1);
+    setenv("VES_TEST_LOSS", loss.c_str(), 1);
+    arguments.insert(arguments.begin(), source + "/" + script);
+    return {"/usr/bin/python3", arguments};
+  }
   /// Commands of a log, in order.
   static std::vector<std::array<std::int32_t, 8>> commands(const fs::path& folder) {
     std::vector<std::array<std::int32_t, 8>> all;

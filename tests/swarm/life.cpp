@@ -338,10 +338,11 @@ Life draw(std::uint64_t seed, const std::filesystem::path& config) {
       life.events.push_back(ask(tick, "tare"));
     } else if (what < 70) {
       const auto factor = [&] { return std::exp2(dice.between(-1.0, 1.0)); };
-      life.events.push_back(
-          ask(tick, fmt::format("vehicle in {:.1f} mass {:.2f} damping {:.2f} "
-                                "stiffness {:.2f}",
-                                dice.between(0.0, 3.0), factor(), factor(), factor())));
+      std::string text =
+          fmt::format("vehicle in {:.1f} mass {:.2f}", dice.between(0.0, 3.0), factor());
+      if (!scenario.floats())
+        text += fmt::format(" damping {:.2f} stiffness {:.2f}", factor(), factor());
+      life.events.push_back(ask(tick, text));
     } else if (what < 74) {
       life.events.push_back(ask(tick, "compensate"));
     } else if (what < 78) {
@@ -351,7 +352,11 @@ Life draw(std::uint64_t seed, const std::filesystem::path& config) {
     } else if (what < 84) {
       life.events.push_back(ask(tick, "reset"));
     } else if (what < 86) {
-      life.events.push_back(ask(tick, "gripper"));
+      const int jets = propulsionOf(e.controller.vehicle).size;
+      life.events.push_back(
+          ask(tick, jets > 0 ? fmt::format("thrust {:.3f} {}", dice.between(0.005, 1.0),
+                                           dice.whole(0, jets - 1))
+                             : "gripper"));
     } else if (what < 92) {
       life.events.push_back(ask(tick, "arm"));
     } else if (has_robot) {

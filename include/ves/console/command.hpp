@@ -34,6 +34,7 @@ enum class Verb {
   kUncompensate,
   kVehicle,
   kGripper,
+  kThrust,
   kWait,
   kHelp,
   kQuit

@@ -110,6 +110,19 @@ struct VehicleOrder {
   }
 };
 
+inline constexpr int kMostThrusters = 16;      // [-] of a vehicle
+inline constexpr double kLongestThrust = 1e3;  // [s] by one order
+
+/// Thrusters of a vehicle that floats are on from now on, for so long [s] each; 0: as it was.
+using ThrustOrder = Eigen::Matrix<double, kMostThrusters, 1>;
+
+/// What a vehicle that floats pushes itself with in a step.
+struct Thrust {
+  double time = 0.0;                       // [s] since it was let go, when the step begins
+  ThrustOrder left = ThrustOrder::Zero();  // [s] that each thruster is on from then, by orders
+  std::uint32_t on = 0;  // bit i: thruster i, kMostThrusters + i: the couple about axis i of P
+};
+
 /// Whether admittance control with this vehicle, robot and machine decays (analysis/gate.hpp).
 enum class Stability : std::int32_t {
   kUnknown,   // not checked: refused
@@ -145,6 +158,7 @@ enum class Request : std::int32_t {
   kOvertaken,     // an order that a hold or a stop came before: it is answered, and not obeyed
   kVehicle,       // its mass, damping and stiffness change to the order's
   kGripper,       // it has closed or opened: what is in the hand is to be learnt
+  kThrust,        // the vehicle's thrusters are on for so long as the order says
   kCount
 };
 
@@ -168,6 +182,9 @@ enum class Refusal : std::int32_t {
   kTooLong,      // the loop grows, slowly: longer than the program's segments it was not let pass
   kTooFast,      // a mode of the vehicle would be too fast to be followed with the robot on it
   kNotLearning,  // the robot's masses, and so what is in its hand, are not learnt
+  kNoSuchPart,   // the vehicle has no springs, dampers or thrusters, or not this one
+  kTooShort,     // a thruster cannot be on for so short a time
+  kNotEmulated,  // no vehicle is emulated now
   kCount
 };
 
@@ -183,14 +200,15 @@ struct Order {
   Request request = Request::kNone;
   Segment segment;  // of kRun
   OrderId id;
-  std::int64_t controller = 0;  // header.source of the states of the one that is meant
-  VehicleOrder vehicle = {};    // of kVehicle,
-  VehicleVerdict verdict = {};  // and what the stability check says of it
+  std::int64_t controller = 0;               // header.source of the states of the one that is meant
+  VehicleOrder vehicle = {};                 // of kVehicle,
+  VehicleVerdict verdict = {};               // and what the stability check says of it
+  ThrustOrder thrust = ThrustOrder::Zero();  // of kThrust
 };
 
 /// An order of which the name is not all: it has to be kept to be given again.
 constexpr bool hasNumbers(Request request) noexcept {
-  return request == Request::kRun || request == Request::kVehicle;
+  return request == Request::kRun || request == Request::kVehicle || request == Request::kThrust;
 }
 
 }  // namespace ves

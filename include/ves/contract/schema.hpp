@@ -31,6 +31,7 @@ enum class Along {
   kBodyAxes,
   kAxes,
   kTurn,  // a rotation matrix, row by row
+  kThrusters,
   kNumbers
 };
 
@@ -130,8 +131,8 @@ constexpr auto fields(S& s) {
 template <>
 inline constexpr Message kMessage<Order>{
     "operator_t",
-    "Operator -> controller. Channel VES_OPERATOR. Of what follows `request` only a run's and a "
-    "vehicle's count."};
+    "Operator -> controller. Channel VES_OPERATOR. Of what follows `request` only what is its own "
+    "counts."};
 
 /// header: source and sequence are `id`.
 template <Of<Order> S>
@@ -156,6 +157,9 @@ constexpr auto fields(S& s) {
       Field{"vehicle_damping", "-", s.vehicle.to.damping, "the same"},
       Field{"vehicle_stiffness", "-", s.vehicle.to.stiffness, "the same"},
       Field{"vehicle_over", "s", s.vehicle.over, "that the change takes"},
+      Field{"thrust", "s", s.thrust,
+            "of thrust: how long each thruster of the vehicle is on from now on; 0: as it was",
+            kNumbers},
   };
 }
 
@@ -325,14 +329,21 @@ constexpr auto fields(S& s) {
       Field{"vehicle_stiffness", "-", s.vehicle.stiffness, "the same"},
       Field{"vehicle_energy", "J", s.vehicle_energy,
             "that the last change of the vehicle has put in, less what was taken for it"},
+      Field{"vehicle_time", "s", s.thrust.time,
+            "since it was let go, from which this tick's step goes on; of one that floats"},
+      Field{"thrust_left", "s", s.thrust.left,
+            "that each of its thrusters is on from then, by orders", kThrusters, "left"},
+      Field{"thrusters_on", "-", s.thrust.on,
+            "bit i: thruster i is on in the step; bit 16, 17, 18: couples about x, y, z are, "
+            "which hold its attitude"},
   };
 }
 
 static_assert(members<Sample>() == 15 && members<LegCommand>() == 8 &&
-                  members<MachineSetup>() == 17 && members<TickState>() == 52 &&
-                  members<Order>() == 6 && members<VehicleOrder>() == 2 &&
+                  members<MachineSetup>() == 17 && members<TickState>() == 53 &&
+                  members<Order>() == 7 && members<VehicleOrder>() == 2 &&
                   members<VehicleFactors>() == 3 && members<VehicleVerdict>() == 2 &&
-                  members<Segment>() == 5 && members<Trajectory>() == 4,
+                  members<Thrust>() == 3 && members<Segment>() == 5 && members<Trajectory>() == 4,
               "a member has come or gone: describe it above, and count it here");
 
 /// f(field) of each.

@@ -100,6 +100,7 @@ struct TickState {
   VehicleVerdict request_verdict;
   VehicleFactors vehicle;
   double vehicle_energy = 0.0;
+  Thrust thrust;
 };
 
 }  // namespace ves

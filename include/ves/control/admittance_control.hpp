@@ -46,10 +46,15 @@ class AdmittanceControl {
   const PathPoint<6>& step(const AdmittanceInput& in, const PathPoint<6>& last,
                            const PathChecks& checks) noexcept;
 
-  /// Whether a vehicle with these factors can be stepped in a tick.
-  bool affords(const VehicleOrder& order) const noexcept;
+  /// Why the vehicle cannot become as ordered.
+  Refusal refuses(const VehicleOrder& order) const noexcept {
+    return model_.refuses(change_.ordered(order), inertia_);
+  }
   /// Another vehicle: by and by while this one is emulated, else at once.
   void change(const VehicleOrder& order, bool emulated) noexcept;
+
+  /// Thrusters of the vehicle that is emulated are on from the next step on, unless it is refused.
+  Refusal fire(const ThrustOrder& order) noexcept { return model_.fire(order); }
 
   /// Nothing is emulated from now on: the laboratory rests where it is.
   void end() noexcept { frame_.rest(); }
@@ -66,6 +71,7 @@ class AdmittanceControl {
   const Oscillation& oscillation() const noexcept { return oscillation_; }
   const EnergyAccount& energy() const noexcept { return energy_; }
   const VehicleFactors& vehicle() const noexcept { return model_.factors(); }
+  Thrust thrust() const noexcept { return model_.thrust(); }
   const VehicleChange& vehicleChange() const noexcept { return change_; }
   double scale() const noexcept { return scale_; }  // [-] of the last step, 1: all of it was taken
 

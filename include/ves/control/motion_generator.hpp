@@ -30,6 +30,11 @@ class MotionGenerator {
     admittance_.change(order, emulated);
   }
 
+  /// The emulated vehicle's thrusters, from the next step on.
+  Refusal fire(const ThrustOrder& order) noexcept {
+    return emulates_ ? admittance_.fire(order) : Refusal::kNotEmulated;
+  }
+
   /// (C.2) to (C.7): the next state of the base.
   Waypoint<6> admittanceModel(const AdmittanceInput& in, const PathChecks& checks) noexcept;
   /// (C.8) to (C.10), moves and recorded paths.

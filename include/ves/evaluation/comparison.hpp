@@ -87,10 +87,12 @@ class ReferenceMotions {
 
 /// The robot on its base in free space, in the first admittance segment of the program, let go at
 /// `start` from home: a point a tick. None without admittance control, and where the motion grows
-/// without bound. `pushes` that there were take the place of the program's.
+/// without bound. `pushes` that there were take the place of the program's; `firings` are those by
+/// orders.
 std::optional<Motion> baseMotion(const Experiment& experiment, const Vec6& start,
                                  ReferenceMotions& references,
-                                 const std::vector<TimedAction>* pushes = nullptr);
+                                 const std::vector<TimedAction>* pushes = nullptr,
+                                 const std::vector<OrderedFiring>& firings = {});
 
 /// Pushes on the machine in the first admittance segment, the program's and others, since it began.
 class ToldPushes {
@@ -105,6 +107,12 @@ class ToldPushes {
   std::vector<TimedAction> list_;
 };
 std::vector<TimedAction> pushesOf(const Series& series);
+
+/// What the vehicle's thrusters were ordered to fire in the first admittance segment, since it was
+/// let go.
+std::vector<OrderedFiring> firingsOf(const Series& series);
+/// Whether an order has a thruster on.
+bool firesByOrder(const state_t& state) noexcept;
 
 /// Whether the vehicle is the configuration's, which an order may have changed.
 bool ofConfiguredVehicle(const state_t& state) noexcept;

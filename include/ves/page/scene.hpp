@@ -46,6 +46,7 @@ class Scene {
                nlohmann::ordered_json shape);
   void addArm();
   void addEmulated();
+  void addThrusters(const Propulsion& propulsion);
   Vec3 compass() const;
   void addWorld(const Environment& environment);
   /// A large platform's robot and sensor are no larger.

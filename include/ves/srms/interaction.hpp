@@ -38,6 +38,7 @@ struct Interaction {
   Payload payload;                       // what stands on it
   JointVector q0 = JointVector::Zero();  // [rad | m]
   std::vector<TimedAction> actions;      // of the robot, by time
+  std::vector<OrderedFiring> firings;    // of a vehicle that floats, beside its schedule
   std::optional<World> world;            // what its tool touches
   Vec3 p_IH = Vec3::Zero();              // [m] where P is in I when the base is at x = 0
   Vec6 start =
@@ -70,9 +71,9 @@ struct InteractionPoint {
   ContactWatch contacts;  // up to now
 };
 
-/// Cash and Karp's Runge-Kutta 5(4), by Boost, with adaptive steps; where the tool begins or ceases to
-/// touch something, a step ends to 1e-12 s. Throws std::domain_error when the tolerance cannot be
-/// kept.
+/// Cash and Karp's Runge-Kutta 5(4), by Boost, with adaptive steps; where the tool begins or ceases
+/// to touch something, a step ends to 1e-12 s. Throws std::domain_error when the tolerance cannot
+/// be kept.
 std::vector<InteractionPoint> simulate(const Interaction& interaction,
                                        const InteractionOptions& options);
 

@@ -27,6 +27,9 @@ struct VehicleModel {
 /// Its modes about home: what can be said of it before it moves far.
 ModalModel linearised(const VehicleModel& model);
 
+/// What it pushes itself with; nothing for one that stands.
+Propulsion propulsionOf(const VehicleModel& model) noexcept;
+
 /// Any of them, in its inertial frame I; where the laboratory moves, that is E (control/
 /// moving_frame.hpp).
 class AdmittanceModel {
@@ -85,9 +88,18 @@ class AdmittanceModel {
   double costOf(const VehicleFactors& factors) const noexcept {
     return each([&](const auto& v) { return v.costOf(factors); });
   }
-  /// Whether a step of such a vehicle is short enough for a tick.
-  bool affords(const VehicleFactors& factors) const noexcept {
-    return each([&](const auto& v) { return v.affords(factors); });
+  /// Why it cannot become so, with a body on it or without.
+  Refusal refuses(const VehicleFactors& factors, bool with_body) const noexcept {
+    return each([&](const auto& v) { return v.refuses(factors, with_body); });
+  }
+
+  /// Its thrusters are on from the next step's beginning on, unless that is refused.
+  Refusal fire(const ThrustOrder& order) noexcept {
+    return each([&](auto& v) { return v.fire(order); });
+  }
+  /// What it pushed itself with in the last step.
+  Thrust thrust() const noexcept {
+    return each([](const auto& v) -> Thrust { return v.thrust(); });
   }
 
   /// Energies, work and damping are of its motion beside this [m/s, rad/s] of Po in I, in which a

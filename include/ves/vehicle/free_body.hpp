@@ -72,7 +72,13 @@ class FreeBody {
   double costOf(const VehicleFactors& to) const noexcept {
     return (to.mass / factors_.mass - 1.0) * kineticEnergy();
   }
-  bool affords(const VehicleFactors&) const noexcept { return true; }
+  /// A body has a mass only.
+  Refusal refuses(const VehicleFactors& to, bool) const noexcept {
+    return to.damping == 1.0 && to.stiffness == 1.0 ? Refusal::kNone : Refusal::kNoSuchPart;
+  }
+  /// From the next step's beginning on; what another order left of a thruster's time is forgotten.
+  Refusal fire(const ThrustOrder& order) noexcept;
+  const Thrust& thrust() const noexcept { return thrust_; }
 
   void countFrom(const Vec6& rate) noexcept { along_ = rate; }
   double kineticEnergy() const noexcept;
@@ -106,6 +112,7 @@ class FreeBody {
     BodyMotion motion;
     double time = 0.0;  // [s] since it was let go
     Pulses pulses;
+    std::array<OrderedFiring, kMostThrusters> ordered{};  // one a thruster
   };
 
   Vec6 way() const noexcept { return way_ - dt_ * along_; }
@@ -120,6 +127,7 @@ class FreeBody {
   double dt_ = 0.0;  // [s] of the last step
   Gyrostat whole_;   // with the robot
   State now_, before_;
+  Thrust thrust_;                 // of the last step
   Vec6 way_ = Vec6::Zero();       // [m, rad] of the last step, in I
   Vec6 along_ = Vec6::Zero();     // [m/s, rad/s] that energies and damping count from
   Vec6 pushed_ = Vec6::Zero();    // [N, N m] by thrusters in it, in I

@@ -175,10 +175,15 @@ class ModalVehicle {
   const VehicleFactors& factors() const noexcept { return factors_; }
   /// [J] that becoming so puts in.
   double costOf(const VehicleFactors& factors) const noexcept;
-  /// Whether a step by series, with a body or with coupled modes, is short enough for a tick.
-  bool affords(const VehicleFactors& factors) const noexcept {
-    return nominal_.scaled(factors).angle(period_) <= kMostModalAngle;
+  /// Whether a step by series, with a body or with coupled modes, is too long for a tick.
+  Refusal refuses(const VehicleFactors& factors, bool with_body) const noexcept {
+    const bool by_series = with_body || coupled();
+    return !by_series || nominal_.scaled(factors).angle(period_) <= kMostModalAngle
+               ? Refusal::kNone
+               : Refusal::kTooFast;
   }
+  Refusal fire(const ThrustOrder&) const noexcept { return Refusal::kNoSuchPart; }
+  Thrust thrust() const noexcept { return {}; }
 
   void countFrom(const Vec6&) noexcept {}  // nobody flies along with what stands
   /// [J]

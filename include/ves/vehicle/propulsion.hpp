@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// What a body that floats pushes itself with: thrusters that fire by a schedule, couples of them
-// that hold its attitude within a dead band, and reaction wheels. Beyond the report.
+// What a body that floats pushes itself with: thrusters that fire by a schedule and by orders,
+// couples of them that hold its attitude within a dead band, and reaction wheels. Beyond the
+// report.
 #pragma once
 
 #include <array>
+#include <span>
 
+#include "ves/contract/order.hpp"
 #include "ves/math/frames.hpp"
 
 namespace ves {
@@ -18,11 +21,11 @@ struct Firing {
 };
 
 struct Thruster {
-  static constexpr int kMost = 16;         // [-] of a body
   static constexpr int kMostFirings = 64;  // [-] of each
 
   Vec3 p_PoT_P = Vec3::Zero();  // [m]
   Vec3 force_P = Vec3::Zero();  // [N]
+  double least_on = 0.0;        // [s]
   std::array<Firing, kMostFirings> firings{};
   int size = 0;  // [-] of them
 
@@ -64,7 +67,7 @@ struct ReactionWheel {
 };
 
 struct Propulsion {
-  std::array<Thruster, Thruster::kMost> thrusters{};
+  std::array<Thruster, kMostThrusters> thrusters{};
   int size = 0;  // [-] of them
   AttitudeHold hold;
   std::array<ReactionWheel, ReactionWheel::kMost> wheels{};
@@ -86,8 +89,24 @@ Pulses pulsesOf(const AttitudeHold& hold, const Pulses& before, const Vec3& turn
 /// They fire for dt [s].
 Pulses spent(const Pulses& pulses, double dt) noexcept;
 
-/// The mean of what fires from t on over dt [s], about Po in P.
-Wrench thrust(const Propulsion& propulsion, const Pulses& pulses, double t, double dt) noexcept;
+/// One by an order; those of one thruster do not overlap. A thruster that its schedule has on too
+/// is on once.
+struct OrderedFiring {
+  int thruster = 0;  // [-]
+  Firing on;
+
+  bool operator==(const OrderedFiring&) const = default;
+};
+
+struct Firings {
+  Wrench mean;           // about Po in P, over the time
+  std::uint32_t on = 0;  // as Thrust::on
+
+  void add(const Wrench& F_P, double share, int bit) noexcept;  // [-] of the time
+};
+/// What fires from t on over dt [s].
+Firings firings(const Propulsion& propulsion, const Pulses& pulses,
+                std::span<const OrderedFiring> ordered, double t, double dt) noexcept;
 
 /// [N m s] of the wheels beside the body at t [s], in P.
 Vec3 wheelMomentum(const Propulsion& propulsion, double t) noexcept;
