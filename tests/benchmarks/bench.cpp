@@ -257,8 +257,9 @@ void LegSlavePeriod(benchmark::State& state) {  // 1023 us of one leg
 }
 BENCHMARK(LegSlavePeriod);
 
-void PlantPeriod(benchmark::State& state) {  // 10 ms of the machine with a PUMA
-  const Experiment e = experiment("puma_on_table_4_1");
+/// 10 ms of the machine with a PUMA.
+void plantPeriod(benchmark::State& state, const char* legs) {
+  const Experiment e = experiment("puma_on_table_4_1", {std::string("legs.model=") + legs});
   plant::Plant plant(e.plant);
   std::int64_t t = 0;
   for (auto _ : state) {
@@ -266,7 +267,10 @@ void PlantPeriod(benchmark::State& state) {  // 10 ms of the machine with a PUMA
     benchmark::DoNotOptimize(plant.sample());
   }
 }
+void PlantPeriod(benchmark::State& state) { plantPeriod(state, "ideal"); }
+void PlantPeriodHydraulic(benchmark::State& state) { plantPeriod(state, "hydraulic"); }
 BENCHMARK(PlantPeriod);
+BENCHMARK(PlantPeriodHydraulic);
 
 void rates(benchmark::State& state, double simulated, std::int64_t ticks) {
   state.counters["x_real_time"] = benchmark::Counter(simulated, benchmark::Counter::kIsRate);

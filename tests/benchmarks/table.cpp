@@ -180,7 +180,7 @@ int main(int argc, char** argv) {
   Json out;
   out["machine"] = machine();
   const std::string processor = out["machine"].value("processor", "unknown processor");
-  fmt::print("{}, {} cores, {}\n\n{:<28}{:>12}{:>22}{}\n", processor,
+  fmt::print("{}, {} cores, {}\n\n{:<28}{:>12}{:>24}{}\n", processor,
              out["machine"]["cores"].get<int>(), VES_BENCH_FLAGS, "", "median",
              "of the middle half", beside.empty() ? "" : fmt::format("{:>12}", "beside"));
   Json& results = out["results"];
@@ -204,7 +204,7 @@ int main(int argc, char** argv) {
       column = fmt::format("{:>12}", other["results"].contains(row.name)
                                          ? time(other["results"][row.name]["median_ns"])
                                          : "-");
-    fmt::print("{:<28}{:>12}{:>22}{}{}\n", row.name, time(quantile(row.ns, 0.5)),
+    fmt::print("{:<28}{:>12}{:>24}{}{}\n", row.name, time(quantile(row.ns, 0.5)),
                time(quantile(row.ns, 0.25)) + " .. " + time(quantile(row.ns, 0.75)), column,
                remark);
   }
