@@ -280,6 +280,25 @@ TEST(Distance, OfAToolIsThatOfItsPoints) {
   EXPECT_NEAR(d.rms, std::sqrt((3 * 1e-4 + 25e-4) / 4.0), 1e-12);
 }
 
+TEST(Distance, HasMeanSquaresOfPlaceAndAttitude) {
+  Motion a, b;
+  const double off[] = {0.0, 0.02, 0.04};
+  for (int n = 0; n < 3; ++n) {
+    a.t.push_back(n);
+    b.t.push_back(n);
+    b.x.push_back(Vec6::Constant(1.0));
+    a.x.push_back(b.x.back() + off[n] * Vec6::Unit(1) + 10.0 * off[n] * Vec6::Unit(4));
+  }
+  const Distance d = distance(a, b);
+  const double rms = std::sqrt((4e-4 + 16e-4) / 3.0);
+  EXPECT_NEAR(d.rms_position, rms, 1e-12);
+  EXPECT_NEAR(d.rms_attitude, 10.0 * rms, 1e-12);
+  EXPECT_NEAR(d.peak_position, 0.04, 1e-12);
+  EXPECT_NEAR(d.peak_attitude, 0.4, 1e-12);
+  EXPECT_EQ(distance(a, Motion()).rms_position, 0.0);
+  EXPECT_NEAR(travel(a).peak_position, 0.04, 1e-12);
+}
+
 TEST(Distance, ComparesTwoMotionsAtTheTimesOfTheFirst) {
   Motion wave, seen;
   for (int n = 0; n <= 100; ++n) {

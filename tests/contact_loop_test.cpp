@@ -225,6 +225,25 @@ TEST(ExpectedContacts, AreFoundWhereTheRobotGoes) {
   EXPECT_TRUE(expectedContacts(elsewhere.controller, elsewhere.plant.task).empty());
 }
 
+// From the surface of the tool's ball on.
+TEST(ExpectedContacts, AreWithinReachOfTheToolsSurface) {
+  const auto found = [](double radius, double away) {
+    const Experiment e = test::experiment(
+        "puma_on_table_4_1",
+        {"gravity_m_per_s2=0", "initial_pose={}",
+         "program=[{move: {}}, {admittance: {duration_s: 1}}]",
+         fmt::format(
+             "environment={{tool: [{{radius_m: {}}}], contact: {{stiffness: 2000}}, bodies: "
+             "[{{from_tool_m: [{}, 0, 0], rpy_deg: [0, -90, 0], half_space: {{}}}}]}}",
+             radius, away)});
+    return !expectedContacts(e.controller, e.plant.task).empty();
+  };
+  EXPECT_TRUE(found(0.0, 0.04));
+  EXPECT_FALSE(found(0.0, 0.15));
+  EXPECT_TRUE(found(0.11, 0.15));
+  EXPECT_FALSE(found(0.11, 0.26));
+}
+
 // A target that is far off may come near, and one that is near may be on its way from there.
 TEST(ExpectedContacts, FollowATargetOnItsWay) {
   const auto found = [](double away, double speed) {

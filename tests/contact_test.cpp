@@ -182,6 +182,34 @@ TEST(Contact, ActionIsReactionAboutEveryPoint) {
   EXPECT_GT(touched, 50);
 }
 
+// Beside the distance a moment earlier and later, wherever the tool and what floats go and turn.
+TEST(Contact, ClosesAsFastAsItsDistanceShrinks) {
+  std::mt19937 random(6);
+  std::uniform_real_distribution<double> u(-1.0, 1.0);
+  const auto vector = [&] { return Vec3(u(random), u(random), u(random)); };
+  Environment e = drifting({1e4, 1.5, 5.0, 0.4, 1e-3}, 80.0, 0.02);
+  e.tool = {{{0.1, 0.0, 0.0}, 0.02}};
+  for (int i = 0; i < 100; ++i) {
+    e.target->shape = i % 2 ? Shape(Ball{0.3}) : Shape(Box{{0.5, 0.4, 0.3}});
+    FrameMotion tool{{rotation(vector()), vector()}, vector(), vector()};
+    Floating body;
+    body.p = vector();
+    body.q = Eigen::Quaterniond(rotation(vector()));
+    body.v = vector();
+    body.w = vector();
+    const auto least = [&](double t) {
+      FrameMotion then = tool;
+      then.X = {rotationOf(t * tool.w) * tool.X.R, tool.X.p + t * tool.v};
+      Floating there = body;
+      there.p = body.p + t * body.v;
+      there.q = Eigen::Quaterniond(rotationOf(t * body.w)) * body.q;
+      return touch(e, then, there).least;
+    };
+    constexpr double h = 1e-6;  // [s]
+    EXPECT_NEAR(touch(e, tool, body).closing, (least(-h) - least(h)) / (2.0 * h), 1e-5) << i;
+  }
+}
+
 // A ball that slides and spins on a wall: friction acts where they touch, against what moves there.
 TEST(Contact, ABallTouchesAtItsSurface) {
   Environment e;
@@ -441,6 +469,21 @@ TEST(ContactWatch, TakesMeanSpeeds) {
     EXPECT_NEAR(watch.last().separation, 0.02, 0.02 * 0.005) << apart;
     EXPECT_NEAR(watch.last().duration, 0.1 + 0.15, 2e-3);
     EXPECT_NEAR(watch.last().impulse.x(), watch.last().duration, apart);
+  }
+}
+
+// Seen only a moment before it touches, or not before at all.
+TEST(ContactWatch, TakesWhatItHasSeenOfAnApproach) {
+  for (const int looks : {0, 1, 2}) {
+    ContactWatch watch;
+    for (int i = -looks; i <= 3; ++i) {
+      Touch touch;
+      touch.least = -0.04 * (2e-3 * i + 1e-3);  // 0.04 m/s
+      touch.closing = 0.05;                     // at this very moment, as a ripple has it
+      watch.see(2e-3 * i, touch);
+    }
+    EXPECT_EQ(watch.count(), 1);
+    EXPECT_NEAR(watch.last().approach, looks == 0 ? 0.05 : 0.04, 1e-12) << looks;
   }
 }
 

@@ -224,6 +224,41 @@ TEST(FreeBody, KeepsItsBooks) {
   EXPECT_NEAR(given - paid, kept, 2e-3 * given);
 }
 
+TEST(FreeBody, SlowedGoesAShareOfItsWayAndAsMuchSlower) {
+  for (const double share : {0.0, 0.3, 1.0}) {
+    FreeBodyModel model = asymmetric({0.1, 0.2, -0.5});
+    model.v_IPo_I = {0.2, -0.1, 0.05};
+    model.w_IP_I = {0.3, 0.5, -0.4};
+    model.propulsion.size = 1;
+    model.propulsion.thrusters[0].force_P = {5.0, 0.0, 0.0};
+    FreeBody body(model, kTick);
+    body.reset(Vec6::Constant(0.02));
+    const Wrench F{{9.0, 6.0, -3.0}, {1.5, 3.0, -2.0}};
+    for (int n = 0; n < 20; ++n) body.step(F);
+    const BodyMotion from = body.bodyMotion();
+    body.step(F);
+    const BodyMotion to = body.bodyMotion();
+    const double given = body.taken(F);
+    body.slow(share);
+    const BodyMotion& m = body.bodyMotion();
+    EXPECT_LT((m.X.p - (from.X.p + share * (to.X.p - from.X.p))).norm(), 1e-15);
+    const Vec3 turn = rotationVector(to.X.R * from.X.R.transpose());
+    EXPECT_LT((m.X.R - rotationOf(share * turn) * from.X.R).norm(), 1e-14);
+    EXPECT_EQ(m.v, Vec3(share * to.v));
+    EXPECT_EQ(m.w, Vec3(share * to.w));
+    EXPECT_LT((m.a - (m.v - from.v) / kTick).norm(), 1e-12);
+    EXPECT_LT((m.alpha - (m.w - from.w) / kTick).norm(), 1e-12);
+    EXPECT_EQ(body.state().p, m.X.p);
+    EXPECT_EQ(body.state().v, m.v);
+    EXPECT_EQ(body.state().w, m.w);
+    EXPECT_LT((body.state().R_IP - m.X.R).norm(), 1e-15);
+    EXPECT_NEAR(body.taken(F), share * given, 1e-15);
+    // Its clock has waited as well.
+    body.step(F);
+    EXPECT_NEAR(body.thrust().time, (20.0 + share) * kTick, 1e-12);
+  }
+}
+
 // --- In free space, with a robot on it -----------------------------------------------------------
 
 /// A link of mass m at l from its joint, which is r from the body's centre of mass, all in a plane.

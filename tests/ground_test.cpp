@@ -230,6 +230,28 @@ TEST(Ground, ItsWorkIsInTheBooks) {
   EXPECT_GT(most, 0.01);
 }
 
+TEST(Ground, AWrenchWorksAlongAllOfTheWay) {
+  // Of the ground and of the vehicle on it; a ground alone has no other.
+  for (const bool stands : {false, true}) {
+    VehicleModel vehicle = oscillators(0.1);
+    if (stands) vehicle = ModalModel{Eigen::MatrixXd(6, 0), {}, {}};
+    vehicle.ground = wave(2.0 * M_PI * 0.45, (Vec6() << 0.05, 0.03, -0.04, 0, 0, 0).finished(),
+                          Vec6::Constant(0.02), 1.0);
+    AdmittanceModel model(vehicle, kPeriod);
+    model.reset(Vec6::Zero());
+    const Wrench F{{20.0, -10.0, 5.0}, Vec3::Zero()};
+    double most = 0.0;
+    for (int n = 0; n < 300; ++n) {
+      const Vec3 from = model.motion().x.head<3>();
+      model.step(F);
+      const double due = F.f.dot(model.motion().x.head<3>() - from);
+      EXPECT_NEAR(model.taken(F), due, 1e-12) << n;
+      most = std::max(most, std::abs(due));
+    }
+    EXPECT_GT(most, 1e-3);
+  }
+}
+
 // --- From files ----------------------------------------------------------------------------------
 
 TEST(Sea, HasItsHeightAndItsSpectrum) {
