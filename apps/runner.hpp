@@ -170,7 +170,10 @@ inline int runExperiment(RunnerOptions& options) {
   LaunchOptions launch = prepareFolder(options, experiment);
   const RunResult result = execute(options, experiment, launch);
   const std::string table = writeResults(launch.scenario.parent_path(), result, options.plots);
-  if (!options.quiet) fmt::print("{}", table);
+  if (!options.quiet)
+    fmt::print("{}", table);
+  else if (!result.good())
+    fmt::print(stderr, "ves run: {}\n", whyNot(result));
   return statusOf(result);
 }
 

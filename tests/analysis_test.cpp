@@ -14,6 +14,7 @@
 #include "ves/evaluation/tool_motion.hpp"
 #include "ves/math/dense.hpp"
 #include "ves/run/run.hpp"
+#include "ves/series/series.hpp"
 #include "ves/srms/modes.hpp"
 
 namespace ves {
@@ -278,6 +279,39 @@ TEST(Distance, OfAToolIsThatOfItsPoints) {
   const ToolDistance d = distance(a, b);
   EXPECT_NEAR(d.peak, 0.05, 1e-12);
   EXPECT_NEAR(d.rms, std::sqrt((3 * 1e-4 + 25e-4) / 4.0), 1e-12);
+}
+
+// The program's motions of the robot did not happen in what was ordered by hand.
+TEST(Comparison, IsOfWhatTheProgramDid) {
+  Series series;
+  series.experiment = test::experiment("puma_on_table_4_1");
+  Row row;
+  row.state = {};
+  row.state.phase = static_cast<int>(Phase::kRunning);
+  row.state.kind = static_cast<int>(SegmentKind::kAdmittance);
+  row.state.vehicle_mass = row.state.vehicle_damping = row.state.vehicle_stiffness = 1.0;
+  row.state.segment = 2;
+  series.rows = {row};
+  EXPECT_EQ(whyNotCompared(series), "");
+  series.rows[0].state.segment = -1;
+  EXPECT_NE(whyNotCompared(series).find("ordered by hand"), std::string::npos);
+  series.experiment = test::experiment("free_decay");  // without a robot
+  EXPECT_EQ(whyNotCompared(series), "");
+}
+
+// A stop came before the vehicle had gone far.
+TEST(Comparison, GoesAsFarAsTheRun) {
+  const Series run =
+      recordLockstep(
+          test::experiment("satellite_hold",
+                           {"base.free.thrusters=[{at_m: [0, 0, 0], force_n: [0, 90000, 0], "
+                            "firings_s: [[1, 2]]}]"}))
+          .series;
+  const auto both = emulation(run);
+  ASSERT_TRUE(both);
+  ASSERT_LT(both->base.t.back(), 1.5);
+  EXPECT_LE(both->base.t.back(), both->platform.t.back() + 0.02);
+  EXPECT_LT(travel(both->base).peak_position, 1.0);
 }
 
 TEST(Distance, HasMeanSquaresOfPlaceAndAttitude) {

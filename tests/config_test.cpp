@@ -386,6 +386,20 @@ INSTANTIATE_TEST_SUITE_P(
             "base=!replace {free: {mass_kg: 5, center_m: [0, 0, 1], inertia_kg_m2: [4, 6, 2, 0, 0, "
             "0], inertia_about_m: [0, 0, 0]}}",
             "base.free.inertia_kg_m2: principal moments of -1, 1 and 2 kg m^2"},
+        Bad{"mass_twice", "z_sine",
+            "base.mass=[[9,0,0,0,0,0],[0,9,0,0,0,0],[0,0,9,0,0,0],[0,0,0,9,0,0],[0,0,0,0,9,0],[0,0,"
+            "0,0,0,9]]",
+            "base.mass: stands beside mass_diagonal, want one of them"},
+        Bad{"stiffness_twice", "z_sine",
+            "base.stiffness=[[9,0,0,0,0,0],[0,9,0,0,0,0],[0,0,9,0,0,0],[0,0,0,9,0,0],[0,0,0,0,9,0],"
+            "[0,0,0,0,0,9]]",
+            "base.stiffness: stands beside stiffness_diagonal, want one of them"},
+        Bad{"two_kinds_of_base", "satellite_puma", "base.mass_diagonal=[500,500,500,250,250,250]",
+            "base.mass_diagonal: stands beside free, want a base of one kind"},
+        Bad{"millimetres_for_metres", "z_sine",
+            "program=[{trajectory: {duration_s: 1, z: {sine: {amplitude_m: 200, frequency_hz: "
+            "1}}}}]",
+            "amplitude_m: '200', want a number in [-5, 5]"},
         Bad{"thruster_without_force", "satellite_hold",
             "base.free.thrusters=[{at_m: [0, 0, 0], force_n: [0, 0, 0], firings_s: [[1, 2]]}]",
             "base.free.thrusters[0].force_n: no force"},

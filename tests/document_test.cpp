@@ -84,7 +84,7 @@ TEST(Overrides, ReachIntoListsAndReplaceBlocks) {
   Value v = parseDocument("p: [{a: 1}, {b: {c: 2}}]\nq: {x: 1, y: 2}\n", "a.yaml");
   applyOverride(v, "p.1.b.c=7");
   EXPECT_EQ(v.find("p")->children[1].find("b")->find("c")->text, "7");
-  applyOverride(v, "p.0=3");
+  applyOverride(v, "p[0]=3");
   EXPECT_EQ(v.find("p")->children[0].text, "3");
   applyOverride(v, "q.z=5");
   EXPECT_EQ(v.find("q")->keys.size(), 3u);

@@ -56,6 +56,11 @@ TEST_F(Programs, TrippedRunEndsWithOne) {
   EXPECT_EQ(o.status, 1) << o.text;
   EXPECT_NE(o.text.find("by: position error"), std::string::npos) << o.text;
   EXPECT_EQ(summary(folder_ / "a")["first_cause"], "position error");
+  const Output quiet =
+      run("z_sine --lockstep --quiet --set safety.position_error_m=0.03" + out("b"));
+  EXPECT_EQ(quiet.status, 1);
+  EXPECT_EQ(quiet.text.rfind("ves run: stopped by the position error check", 0), 0U) << quiet.text;
+  EXPECT_EQ(std::count(quiet.text.begin(), quiet.text.end(), '\n'), 1) << quiet.text;
 }
 
 TEST_F(Programs, BadInputIsOneLineAndStatusTwo) {

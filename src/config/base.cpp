@@ -38,18 +38,19 @@ std::string definitenessFault(const Mat6& A, bool semidefinite) {
                                                   1e-12 * scale));
 }
 
+constexpr const char* kBefore = " (`base: !replace` leaves out what a file before said)";
+
 /// A 6x6 given by its rows or, when only it is not zero, by its diagonal.
 Mat6 readMatrix(Section& s, std::string_view key, bool semidefinite) {
-  Mat6 A;
-  if (s.has(std::string(key) + "_diagonal"))
-    A = s.vector(std::string(key) + "_diagonal", 6, -kAny, kAny).asDiagonal();
-  else
-    A = s.matrix(key, 6, 6, -kAny, kAny);
+  const std::string diagonal = std::string(key) + "_diagonal";
+  const bool is_diagonal = s.has(diagonal);
+  if (is_diagonal && s.has(key))
+    s.fail(std::string(key),
+           fmt::format("stands beside {}, want one of them{}", diagonal, kBefore));
+  const Mat6 A = is_diagonal ? Mat6(s.vector(diagonal, 6, -kAny, kAny).asDiagonal())
+                             : Mat6(s.matrix(key, 6, 6, -kAny, kAny));
   const std::string fault = definitenessFault(A, semidefinite);
-  if (!fault.empty())
-    s.fail(
-        s.has(std::string(key) + "_diagonal") ? std::string(key) + "_diagonal" : std::string(key),
-        fault);
+  if (!fault.empty()) s.fail(is_diagonal ? diagonal : std::string(key), fault);
   return A;
 }
 
@@ -359,6 +360,10 @@ Base readBase(Section s) {
     for (const BaseKind& one : kBases) keys.push_back(one.key);
     s.fail("mass", fmt::format("missing, want one of {}", fmt::join(keys, ", ")));
   }
+  for (const BaseKind& other : kBases)
+    if (other.key != "ground" && other.read != kind->read && s.has(other.key))
+      s.fail(std::string(other.key),
+             fmt::format("stands beside {}, want a base of one kind{}", kind->key, kBefore));
   Base out = kind->read(s);
   if (s.has("ground")) {
     if (kind->key == "free")

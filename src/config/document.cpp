@@ -344,10 +344,13 @@ void applyOverride(Value& document, const std::string& assignment) {
   const std::size_t equals = assignment.find('=');
   if (equals == std::string::npos || equals == 0)
     throw InputError(fmt::format("--set {}: want key.path=value", assignment));
+  std::string path = assignment.substr(0, equals);
+  std::erase(path, ']');  // an entry of a list is key[2] or key.2
+  std::replace(path.begin(), path.end(), '[', '.');
   std::vector<std::string> keys;
-  for (std::size_t begin = 0, dot = 0; dot < equals; begin = dot + 1) {
-    dot = std::min(assignment.find('.', begin), equals);
-    keys.push_back(assignment.substr(begin, dot - begin));
+  for (std::size_t begin = 0, dot = 0; dot < path.size(); begin = dot + 1) {
+    dot = std::min(path.find('.', begin), path.size());
+    keys.push_back(path.substr(begin, dot - begin));
   }
   const std::string given = assignment.substr(equals + 1);
   Value leaf = isFileOf(keys.back(), given) ? scalar(given, "--set " + assignment)

@@ -9,8 +9,8 @@
 #include <fstream>
 #include <sstream>
 
-#include "ves/core/spelling.hpp"
 #include "ves/config/experiment.hpp"
+#include "ves/core/spelling.hpp"
 
 namespace ves {
 namespace {
@@ -148,6 +148,7 @@ std::string unitOfKey(std::string_view key) {
       {"n_per_m", "N/m"},
       {"kg_m2", "kg m²"},
       {"n_m2", "N m²"},
+      {"nms", "N m s"},
       {"n_or_nm", "N | N m"},
       {"n_and_nm", "N | N m"},
       {"deg_or_m", "deg | m"},

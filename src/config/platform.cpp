@@ -26,7 +26,8 @@ Mat3 readInertia(Section& s, std::string_view key) {
 /// A length in metres, or an angle in degrees, by coordinate.
 double readCoordinate(Section& s, const std::string& key, int i) {
   const Coordinate& c = coordinate(i);
-  return s.number(fmt::format("{}_{}", key, c.yaml_unit), -kAny, kAny) * c.yaml;
+  const double most = i < 3 ? 5.0 : 360.0;  // [m], [deg]: no platform goes farther
+  return s.number(fmt::format("{}_{}", key, c.yaml_unit), -most, most) * c.yaml;
 }
 
 Pose readPose(Section s) {

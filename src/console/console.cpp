@@ -276,10 +276,14 @@ class Console {
 
   bool give(const Command& command) {
     if (command.verb == Verb::kProgram && phase_ == Phase::kDisarmed && !armFirst()) return true;
-    const auto refusal = session_->order(command.order);
+    // The stability check takes seconds: who types meanwhile, a hold perhaps, is not kept waiting.
+    const bool waits = command.verb != Verb::kVehicle || !terminal_;
+    const auto refusal = session_->order(command.order, waits ? -1 : STDIN_FILENO);
     if (!refusal) {
       say("the controller does not answer");
       failed_ = true;
+    } else if (*refusal == Refusal::kChecking) {
+      say("still asked of the stability check");
     } else if (*refusal != Refusal::kNone) {
       say(fmt::format("not taken: {}{}", name(*refusal), advice(*refusal)));
       failed_ = failed_ || !script_.empty();

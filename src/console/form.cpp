@@ -51,7 +51,7 @@ class Form {
         }
         break;
       case Verb::kThrust:
-        add("seconds", "1", kSeconds);
+        add("seconds", "1", between(1e-3, kLongestThrust, "s"));
         add("thrusters, from 0", "0");
         break;
       case Verb::kGrasp: add("kg", "1", between(0.0, 1e6, "kg")); break;

@@ -44,6 +44,19 @@ PathPoint<6> shownIn(const Laboratory& lab, std::int64_t time, const Vec6& x, co
   return coordinates(relative(lab.at(time), E_P));
 }
 
+/// As far as the run went: a stop may have come before the segment's end.
+Motion asFarAs(const Series& series, Motion motion) {
+  std::int64_t first = -1, last = -1;
+  eachTick(series, [&](const Row& row, double) {
+    last = row.state.header.sequence;
+    if (first < 0) first = last;
+  });
+  const auto gone = static_cast<std::size_t>(last - first) + 2;
+  for (auto* list : {&motion.x, &motion.x_dot}) list->resize(std::min(list->size(), gone));
+  motion.t.resize(std::min(motion.t.size(), gone));
+  return motion;
+}
+
 /// A motion in E from the first tick on, as the laboratory that flew in the run would have shown
 /// it.
 Motion shown(const Series& series, Motion motion) {
@@ -52,10 +65,6 @@ Motion shown(const Series& series, Motion motion) {
   eachTick(series, [&](const Row& row, double) { rows.push_back(&row); });
   if (rows.empty()) return motion;
   const std::int64_t first = rows.front()->state.header.sequence;
-  // No laboratory flew any farther.
-  const auto flown = static_cast<std::size_t>(rows.back()->state.header.sequence - first) + 2;
-  for (auto* list : {&motion.x, &motion.x_dot}) list->resize(std::min(list->size(), flown));
-  motion.t.resize(std::min(motion.t.size(), flown));
   std::size_t row = 0;
   for (std::size_t k = 0; k < motion.x.size(); ++k) {
     const std::int64_t tick = first + static_cast<std::int64_t>(k);
@@ -162,9 +171,11 @@ bool ofConfiguredVehicle(const state_t& s) noexcept {
 }
 
 std::string whyNotCompared(const Series& series) {
-  if (std::none_of(series.rows.begin(), series.rows.end(),
-                   [](const Row& row) { return inAdmittance(row.state); }))
-    return "";
+  const auto first = std::find_if(series.rows.begin(), series.rows.end(),
+                                  [](const Row& row) { return inAdmittance(row.state); });
+  if (first == series.rows.end()) return "";
+  if (first->state.segment < 0 && !series.experiment.plant.task.robot_events.empty())
+    return "it was ordered by hand, without the motions of the robot that its program has";
   if (!std::all_of(series.rows.begin(), series.rows.end(),
                    [](const Row& row) { return ofConfiguredVehicle(row.state); }))
     return "the vehicle was changed on the way";
@@ -227,9 +238,10 @@ std::optional<Emulation> emulation(const Series& series, ReferenceMotions& refer
   out.platform = actual(series);
   if (out.platform.x.size() < 2) return {};
   const std::vector<TimedAction> pushes = pushesOf(series);
-  const auto base = baseMotion(series.experiment, commanded(series).x.front(), references, &pushes,
-                               firingsOf(series));
+  auto base = baseMotion(series.experiment, commanded(series).x.front(), references, &pushes,
+                         firingsOf(series));
   if (!base) return {};
+  base = asFarAs(series, *base);
   out.base = series.experiment.controller.moving_frame.enabled ? shown(series, *base) : *base;
   return out;
 }

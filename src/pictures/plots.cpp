@@ -74,6 +74,8 @@ class Page {
   void panel(const std::string& ylabel, const std::vector<Curve>& curves, double least = 0.0) {
     const Span values = range(curves);
     const double middle = 0.5 * (values.from + values.to);
+    // gnuplot warns of what is no range.
+    if (!(values.to - values.from > 1e-6 * std::abs(middle))) least = std::max(least, 1.0);
     script_ += values.to - values.from < least
                    ? fmt::format("set yrange [{}:{}]\n", middle - 0.5 * least, middle + 0.5 * least)
                    : "set autoscale y\n";

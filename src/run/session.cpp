@@ -96,7 +96,7 @@ bool Session::listen(int milliseconds, int descriptor) {
   return descriptor >= 0 && wait[1].revents != 0;
 }
 
-std::optional<Refusal> Session::order(const Order& order) {
+std::optional<Refusal> Session::order(const Order& order, int descriptor) {
   const std::int64_t until = monotonicNow() + kFirstState;
   while (!state_ && running() && monotonicNow() < until) listen(kRepeat);
   if (!state_) return {};
@@ -108,7 +108,7 @@ std::optional<Refusal> Session::order(const Order& order) {
     bus_.publish(channel::kOperator, toMessage(addressed, header(self_, sequence, monotonicNow())));
     const std::int64_t repeat = monotonicNow() + kRepeat * 1'000'000LL;
     while (monotonicNow() < repeat && running()) {
-      listen(10);
+      if (listen(10, descriptor)) return Refusal::kChecking;
       const auto refusal = static_cast<Refusal>(state_->refusal);
       if (state_->order_source == self_.source && state_->order_sequence == sequence &&
           refusal != Refusal::kChecking)

@@ -35,8 +35,9 @@ class Session {
   const std::optional<state_t>& state() const { return state_; }
 
   /// Sends an order until a state shows that it has been heard: why it was refused, if it was;
-  /// nothing when the controller does not answer.
-  std::optional<Refusal> order(const Order& order);
+  /// nothing when the controller does not answer. kChecking: it had not been answered when there
+  /// was something to read from the descriptor, which goes before.
+  std::optional<Refusal> order(const Order& order, int descriptor = -1);
 
   /// Asks something of the simulated robot.
   void orderRobot(const RobotOrder& order);
