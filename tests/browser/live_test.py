@@ -24,8 +24,8 @@ FREE = [word for key in ("controller.compensation.feed_forward=true", "controlle
                          "program=[{move: {}}, {calibration: {}}, {admittance: {duration_s: 9}}]")
         for word in ("--set", key)]
 
-SWINGING = FREE[:-1] + ["program=[{move: {}}, {calibration: {}}, {admittance: {duration_s: 20}, robot: ["
-                        + ", ".join(f"{{at_s: {1 + 2 * k}, duration_s: 1.5, joint: joint_2, to_deg_or_m: {-60 if k % 2 == 0 else -90}}}"
+SWINGING = FREE[:-1] + ["program=[{move: {}}, {calibration: {}}, {admittance: {duration_s: 60}, robot: ["
+                        + ", ".join(f"{{at_s: {1 + 4 * k}, duration_s: 1.5, joint: joint_2, to_deg_or_m: {-60 if k % 2 == 0 else -90}}}"
                                     for k in range(9)) + "]}]"]
 
 
@@ -106,6 +106,7 @@ class Live(support.Page):
         self.browser.execute_script(slide, "mass", -0.3)
         self.until("ves.words.includes('× 0.5, 1, 2')")
         self.shot("vehicle")
+        self.browser.find_element("id", "stop").click()  # however long the checks took
         self.assertEqual(run.wait(), 0, run.said)
 
     def test_time_stands_and_goes_slowly_in_lockstep(self):
