@@ -135,7 +135,7 @@ void FreeBody::reset(const Vec6& x, const Mat6& M_1, double ahead) noexcept {
   now_.time = ahead > 0.0 ? -ahead : 0.0;
   along_.setZero();
   now_.pulses = {};
-  for (int i = 0; i < kMostThrusters; ++i) now_.ordered[static_cast<std::size_t>(i)] = {i, {}};
+  now_.ordered = {};
   thrust_ = {};
   if (ahead > 0.0 && !(velocity(s).isZero(0.0) && model_.orbit.rate == 0.0))
     s = advanced(whole_, whole_, s, {}, -ahead, model_.orbit);
@@ -221,7 +221,7 @@ Refusal FreeBody::fire(const ThrustOrder& order) noexcept {
   }
   const double from = std::max(0.0, now_.time);
   for (int i = 0; i < kMostThrusters; ++i)
-    if (order(i) > 0.0) now_.ordered[static_cast<std::size_t>(i)].on = {from, from + order(i)};
+    if (order(i) > 0.0) now_.ordered[static_cast<std::size_t>(i)] = {i, {from, from + order(i)}};
   return Refusal::kNone;
 }
 
