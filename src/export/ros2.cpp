@@ -175,7 +175,9 @@ class McapExport::Impl {
 
   /// The base in free space, from where the platform is let go in the first admittance segment.
   void followBase(const state_t& state, bool first) {
-    const bool begins = !first && base_start_ < 0 && inAdmittance(state);
+    // Ordered by hand, the robot does not move as its program has it (whyNotCompared).
+    const bool foreseen = state.segment >= 0 || experiment_.plant.task.robot_events.empty();
+    const bool begins = !first && base_start_ < 0 && inAdmittance(state) && foreseen;
     if (begins) {
       base_start_ = state.header.sequence;
       base_segment_ = state.segment;
