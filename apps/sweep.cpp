@@ -77,11 +77,15 @@ int sweepCommand(int argc, char** argv) {
   cli.add_option("--runs", runs, "of each combination, each with its own noise")
       ->check(CLI::Range(1, 100'000'000))
       ->capture_default_str();
-  cli.add_option("--design", design, "how draws lie: uniform, latin (hypercube) or sobol")
+  cli.add_option(
+         "--design", design,
+         "how draws lie: uniform, latin (hypercube), sobol, or subset: ever nearer to --figure's "
+         "limit, --runs a level, to tell how often it is passed where that is rare")
       ->transform(CLI::CheckedTransformer(
           std::map<std::string, SweepDesign>{{"uniform", SweepDesign::kUniform},
                                              {"latin", SweepDesign::kLatin},
-                                             {"sobol", SweepDesign::kSobol}}));
+                                             {"sobol", SweepDesign::kSobol},
+                                             {"subset", SweepDesign::kSubset}}));
   cli.add_option("--figure", figure,
                  "COLUMN, whose mean is told, or COLUMN>LIMIT: how often; with 95 % confidence");
   cli.add_option("--until", until, "half of that interval, at which no more runs are needed")
@@ -118,7 +122,7 @@ int sweepCommand(int argc, char** argv) {
         return takesOnlyWhole(asked, key);
       });
     // What is wrong with the first and the last is told before hours have passed.
-    for (const std::int64_t run : {std::int64_t{0}, plan.size() - 1}) {
+    for (const std::int64_t run : {std::int64_t{0}, plan.subset() ? 0 : plan.size() - 1}) {
       std::vector<std::string> all = sets;
       for (const std::string& one : plan.overrides(run)) all.push_back(one);
       const Experiment e = loadExperiment(options.scenario, all);
@@ -139,7 +143,8 @@ int sweepCommand(int argc, char** argv) {
     if (terminal) fmt::print(stderr, "\r{:60}\r", "");
     if (!result.complete) {
       const bool others = ranks > 1 && !stop_requested;
-      fmt::print("{} of {} runs so far; {}\n", result.rows, plan.size(),
+      fmt::print("{} of {}{} runs so far; {}\n", result.rows, plan.subset() ? "at most " : "",
+                 plan.size(),
                  others ? fmt::format("the last of the {} processes puts them together", ranks)
                         : "the same command goes on");
       return others ? kDone : kTripped;
@@ -149,9 +154,11 @@ int sweepCommand(int argc, char** argv) {
                options.file.string());
     if (result.figure) {
       const Figure::Estimate& f = *result.figure;
-      const char* none = design == SweepDesign::kUniform ? "" : ", or closer by its design";
-      fmt::print("{}: {:.4g}, {:.4g} to {:.4g} with 95 % confidence{}, of {} runs{}\n", figure,
+      const char* none =
+          design == SweepDesign::kUniform || result.levels ? "" : ", or closer by its design";
+      fmt::print("{}: {:.4g}, {:.4g} to {:.4g} with 95 % confidence{}, of {} runs{}{}\n", figure,
                  f.value, f.low, f.high, none, f.of,
+                 result.levels ? fmt::format(" in {} levels", result.levels) : "",
                  f.without ? fmt::format("; {} have none", f.without) : "");
       if (until > 0.0 && !(f.half() <= until))
         fmt::print("not within {:g}: want more --runs\n", until);

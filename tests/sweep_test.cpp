@@ -339,6 +339,27 @@ TEST_F(Sweep, EndsWhereItsFigureIsKnownWellEnough) {
   EXPECT_EQ(csv("one").compare(0, csv("three").size(), csv("three")), 0);
 }
 
+TEST_F(Sweep, GoesOnInASubsetSimulationWhereItWasKilled) {
+  const std::string runs =
+      "free_decay --set 'program=[{move: {to: {x_m: 0.001}}}]' --draw "
+      "plant_mismatch.gain_extend=0.9:1.1 --runs 100 --design subset --seed 3 "
+      "--figure 'plant_mismatch.gain_extend>1.094' ";  // three in a hundred
+  const test::Output one = sweep(runs + out("one") + "--workers 1");
+  ASSERT_EQ(one.status, 0) << one.text;
+  ASSERT_EQ(sweep(runs + out("three") + "--workers 3").status, 0);
+  const std::string all = csv("one");
+  EXPECT_EQ(all, csv("three"));
+  const auto at = one.text.find("gain_extend>1.094: ");
+  ASSERT_NE(at, std::string::npos) << one.text;
+  EXPECT_GT(std::stod(one.text.substr(at + 19)), 0.014);
+  EXPECT_LT(std::stod(one.text.substr(at + 19)), 0.06);
+  EXPECT_NE(one.text.find(" in 2 levels"), std::string::npos) << one.text;
+  std::ofstream(folder_ / "three/sweep.csv") << all.substr(0, all.size() * 2 / 3);
+  const test::Output again = sweep(runs + out("three"));
+  EXPECT_EQ(csv("three"), all);
+  EXPECT_NE(again.text.find(one.text.substr(at)), std::string::npos) << again.text;
+}
+
 TEST_F(Sweep, KnowsNothingOfAFigureThatFewRunsHave) {
   // A column that is empty in every row: nothing is known, however many rows there are.
   const test::Output o = sweep(
@@ -422,6 +443,10 @@ TEST_F(Sweep, RefusesByName) {
   refused("z_sine --draw plant_mismatch.tau=0.9:1 --runs 4 --design latin --figure seed --until 1" +
               out("s"),
           "--until: fewer runs are no such design");
+  const std::string drawn = "z_sine --draw plant_mismatch.tau=0.9:1 --design subset ";
+  refused(drawn + "--runs 100 --figure seed" + out("s"), "--design subset: want one process, and");
+  refused(drawn + "--runs 90 --figure 'seed>1'" + out("s"), "--runs 90 a level, want a multiple");
+  refused(drawn + "--runs 100 --vary seed=1,2 --figure 'seed>1'" + out("s"), "want no --vary");
   refused("z_sine --vary legs.K_Q=1,2" + out("s"), "legs.K_Q: unknown key");
   refused("z_sine --vary legs.K_P=1,-2" + out("s"), "legs.K_P: '-2'");  // the last one, too
   refused("nothing --vary legs.K_P=1,2" + out("s"), "nothing");

@@ -35,6 +35,12 @@ void Figure::find(const std::vector<std::string>& header) {
   at_ = static_cast<std::size_t>(at - header.begin());
 }
 
+double Figure::beyond(const std::vector<std::string>& cells) const {
+  double x = NAN;
+  if (at_ >= cells.size() || !toNumber(cells[at_], x)) return NAN;
+  return beyond_ == '<' ? limit_ - x : x - limit_;
+}
+
 void Figure::add(const std::vector<std::string>& cells) {
   double x = 0.0;
   if (at_ >= cells.size() || !toNumber(cells[at_], x)) {

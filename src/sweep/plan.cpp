@@ -7,25 +7,11 @@
 #include <utility>
 
 #include "number.hpp"
+#include "random.hpp"
 #include "ves/sweep/sweep.hpp"
 
 namespace ves {
 namespace {
-
-/// splitmix64: a stream of its own for every run and key.
-std::uint64_t mixed(std::uint64_t seed, std::uint64_t run, std::uint64_t key) {
-  std::uint64_t z = seed * 0x9e3779b97f4a7c15u + run * 0xbf58476d1ce4e5b9u + key;
-  for (int i = 0; i < 2; ++i) {
-    z += 0x9e3779b97f4a7c15u;
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    z ^= z >> 31;
-  }
-  return z;
-}
-double uniform(std::uint64_t seed, std::uint64_t run, std::uint64_t key) {
-  return static_cast<double>(mixed(seed, run, key) >> 11) * 0x1p-53;
-}
 
 constexpr std::uint32_t kPointBits = 30;  // [-] of a Sobol point
 
@@ -116,7 +102,7 @@ void SweepPlan::drawWhole(const std::function<bool(const std::string& key)>& tak
 
 std::int64_t SweepPlan::size() const {
   constexpr double kMost = 1e9;
-  double product = static_cast<double>(draws_);
+  double product = static_cast<double>(subset_ ? SubsetSimulation::most(draws_) : draws_);
   for (const Varied& v : varied_) product *= static_cast<double>(v.values.size());
   if (product > kMost)
     throw InputError(fmt::format("--vary: {:g} runs, want at most {:g}", product, kMost));
@@ -140,6 +126,7 @@ std::string SweepPlan::text() const {
     out += fmt::format("draw {}={}:{}{}\n", d.key, d.from, d.to, d.whole ? ", whole" : "");
   if (design_ == SweepDesign::kLatin) out += "a Latin hypercube\n";
   if (design_ == SweepDesign::kSobol) out += "Sobol's points\n";
+  if (subset_) out += "subset simulation\n";
   return out;
 }
 
@@ -148,6 +135,14 @@ void SweepPlan::lay(SweepDesign design) {
   design_ = design;
   if (design != SweepDesign::kUniform && (drawn_.empty() || draws_ == 1))
     throw InputError("--design: places draws, want --draw, and --runs of more than one");
+  if (design == SweepDesign::kSubset) {
+    if (!varied_.empty())
+      throw InputError("--design subset: one question at a time, want no --vary");
+    if (draws_ < 100 || draws_ % SubsetSimulation::kSteps != 0)
+      throw InputError(fmt::format(
+          "--design subset: --runs {} a level, want a multiple of ten, 100 or more", draws_));
+    subset_.emplace(drawn_.size(), draws_, seed_);
+  }
   if (design != SweepDesign::kSobol) return;
   const std::size_t keys = drawn_.size(), runs = static_cast<std::size_t>(draws_);
   if (keys > kMostKeys || runs * keys > kMostNumbers)
@@ -184,9 +179,10 @@ std::vector<std::string> SweepPlan::overrides(std::int64_t run) const {
     left /= n;
   }
   const auto number = static_cast<std::uint64_t>(run);
+  const std::vector<double> chained = subset_ ? subset_->numbers(run) : std::vector<double>();
   for (std::size_t i = 0; i < drawn_.size(); ++i) {
     const Drawn& d = drawn_[i];
-    const double x = share(run, i);
+    const double x = subset_ ? chained[i] : share(run, i);
     double value = d.from + (d.to - d.from) * x;
     // A share may be rounded to one.
     if (d.whole) value = std::min(d.to, std::floor(d.from + (d.to - d.from + 1.0) * x));

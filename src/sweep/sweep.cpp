@@ -16,6 +16,8 @@
 #include <fstream>
 #include <map>
 #include <mutex>
+#include <span>
+#include <stdexcept>
 
 #include "ves/evaluation/summary.hpp"
 #include "ves/realtime/realtime.hpp"
@@ -223,11 +225,87 @@ fs::path partOf(const SweepOptions& options, int rank) {
   return fmt::format("{}.rank{}", options.file.string(), rank);
 }
 
+/// Makes runs, as many at a time as there are workers, and appends their rows to the file.
+class Runner {
+ public:
+  Runner(const SweepPlan& plan, const SweepOptions& options, const fs::path& file,
+         std::map<std::int64_t, std::string>& rows,
+         const std::function<void(const SweepProgress&)>& shown, const std::function<bool()>& stop)
+      : plan_(plan),
+        file_(file),
+        scenario_(loadDocument(options.scenario)),
+        out_(file, std::ios::binary | std::ios::app),
+        rows_(rows),
+        shown_(shown),
+        stop_(stop),
+        workers_(options.workers) {
+    for (const std::string& one : options.overrides) applyOverride(scenario_, one);
+    progress_.done = std::ssize(rows);
+  }
+  void make(std::span<const std::int64_t> runs, std::int64_t of) {
+    progress_.of = of;
+    workers_.execute([&] {
+      tbb::parallel_for_each(runs.begin(), runs.end(), [&](std::int64_t run) {
+        if (stop_()) return;
+        const std::string row = rowOf(plan_, scenario_, run, references_);
+        const std::lock_guard lock_rows(writing_);
+        out_ << row << '\n' << std::flush;
+        if (!out_) throw InputError(file_.string() + ": cannot be written");
+        rows_[run] = row;
+        ++progress_.done;
+        ++progress_.run_now;
+        progress_.elapsed = static_cast<double>(monotonicNow() - start_) * kSecondPerNanosecond;
+        if (shown_) shown_(progress_);
+      });
+    });
+  }
+
+ private:
+  const SweepPlan& plan_;
+  const fs::path& file_;
+  Value scenario_;
+  std::ofstream out_;
+  std::map<std::int64_t, std::string>& rows_;
+  const std::function<void(const SweepProgress&)>& shown_;
+  const std::function<bool()>& stop_;
+  tbb::task_arena workers_;
+  ReferenceMotions references_;
+  std::mutex writing_;
+  SweepProgress progress_;
+  const std::int64_t start_ = monotonicNow();
+};
+
+/// Level after level, until it is done or stopped.
+void simulateSubsets(SubsetSimulation& subset, const Figure& figure, Runner& runner,
+                     const std::map<std::int64_t, std::string>& rows) {
+  for (auto batch = subset.next(); batch.size > 0; batch = subset.next()) {
+    const std::int64_t end = batch.first + batch.size;
+    std::vector<std::int64_t> missing;
+    for (std::int64_t run = batch.first; run < end; ++run)
+      if (!rows.count(run)) missing.push_back(run);
+    runner.make(missing, end);
+    std::vector<double> beyond;
+    for (std::int64_t run = batch.first; run < end; ++run) {
+      const auto row = rows.find(run);
+      if (row == rows.end()) return;
+      beyond.push_back(figure.beyond(cells(row->second)));
+    }
+    try {
+      subset.take(beyond);
+    } catch (const std::domain_error& error) {
+      throw InputError(fmt::format("--figure: {}; it takes too few values", error.what()));
+    }
+  }
+}
+
 }  // namespace
 
-SweepResult sweep(const SweepPlan& plan, const SweepOptions& options,
+SweepResult sweep(SweepPlan& plan, const SweepOptions& options,
                   const std::function<void(const SweepProgress&)>& shown,
                   const std::function<bool()>& stop) {
+  SubsetSimulation* const subset = plan.subset();
+  if (subset && (options.ranks > 1 || !options.figure || !options.figure->counts()))
+    throw InputError("--design subset: want one process, and --figure 'COLUMN>LIMIT'");
   const std::int64_t runs = plan.size();
   const std::string header = headerOf(plan);
   FigureWatch watch(options, header);
@@ -239,40 +317,25 @@ SweepResult sweep(const SweepPlan& plan, const SweepOptions& options,
     throw InputError(fmt::format("{}: another sweep is writing here", part.string()));
   requireSame(plan, options);
   std::map<std::int64_t, std::string> rows = readRows(part, header, runs);
-
-  std::vector<std::int64_t> missing;
-  SweepProgress progress;
-  for (std::int64_t run = options.rank; run < runs; run += options.ranks) {
-    ++progress.of;
-    if (!rows.count(run)) missing.push_back(run);
-  }
-  progress.done = progress.of - static_cast<std::int64_t>(missing.size());
   writeRows(part, header, rows);
-  const std::int64_t start = monotonicNow();
-  if (!missing.empty()) {
-    std::ofstream out(part, std::ios::binary | std::ios::app);
-    Value scenario = loadDocument(options.scenario);
-    for (const std::string& one : options.overrides) applyOverride(scenario, one);
-    ReferenceMotions references;
-    std::mutex writing;
-    tbb::task_arena workers(options.workers);
-    const auto all = std::ssize(missing), each = options.until > 0.0 ? FigureWatch::kEach : all;
-    for (std::int64_t from = 0; from < all && !watch.enough(rows) && !stop(); from += each) {
-      const auto first = missing.begin() + from, last = first + std::min(each, all - from);
-      workers.execute([&] {
-        tbb::parallel_for_each(first, last, [&](std::int64_t run) {
-          if (stop()) return;
-          const std::string row = rowOf(plan, scenario, run, references);
-          const std::lock_guard lock_rows(writing);
-          out << row << '\n' << std::flush;
-          if (!out) throw InputError(part.string() + ": cannot be written");
-          if (options.until > 0.0) rows[run] = row;
-          ++progress.done;
-          ++progress.run_now;
-          progress.elapsed = static_cast<double>(monotonicNow() - start) * kSecondPerNanosecond;
-          if (shown) shown(progress);
-        });
-      });
+  Runner runner(plan, options, part, rows, shown, stop);
+  if (subset) {
+    Figure figure = *options.figure;
+    figure.find(cells(header));
+    simulateSubsets(*subset, figure, runner, rows);
+  } else {
+    std::vector<std::int64_t> missing;
+    std::int64_t of = 0;
+    for (std::int64_t run = options.rank; run < runs; run += options.ranks) {
+      ++of;
+      if (!rows.count(run)) missing.push_back(run);
+    }
+    const std::size_t each = options.until > 0.0 ? FigureWatch::kEach : missing.size();
+    for (std::span<const std::int64_t> left = missing;
+         !left.empty() && !watch.enough(rows) && !stop();) {
+      const std::size_t now = std::min(each, left.size());
+      runner.make(left.first(now), of);
+      left = left.subspan(now);
     }
   }
 
@@ -288,9 +351,16 @@ SweepResult sweep(const SweepPlan& plan, const SweepOptions& options,
   }
   SweepResult result;
   result.rows = std::ssize(rows);
-  result.complete = enough || result.rows == runs;
+  result.complete = subset ? subset->next().size == 0 : enough || result.rows == runs;
   if (options.ranks > 1 && result.complete) watch.enough(rows);
   result.figure = watch.estimate();
+  if (subset) {
+    const SubsetSimulation::Estimate& e = subset->estimate();
+    result.figure->value = e.probability;
+    result.figure->low = e.low;
+    result.figure->high = e.high;
+    result.levels = e.levels;
+  }
   for (const auto& [run, row] : rows) result.not_good += !good(row);
   close(lock);
   if (options.ranks == 1 || result.complete) unlink((part.string() + ".lock").c_str());

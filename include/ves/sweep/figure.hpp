@@ -25,6 +25,10 @@ class Figure {
 
   /// Where the column is. Throws InputError where there is none.
   void find(const std::vector<std::string>& header);
+  /// How often it is beyond a limit, and no mean.
+  bool counts() const { return beyond_ != 0; }
+  /// How far beyond its limit a row's column is [its unit]; NaN where it has none.
+  double beyond(const std::vector<std::string>& cells) const;
   /// A row's cells; one whose cell is no number counts as without.
   void add(const std::vector<std::string>& cells);
 

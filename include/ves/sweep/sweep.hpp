@@ -10,13 +10,15 @@
 
 #include "ves/config/experiment.hpp"
 #include "ves/sweep/figure.hpp"
+#include "ves/sweep/subset.hpp"
 
 namespace ves {
 
 /// How the draws of a combination lie: each for itself; as a Latin hypercube, with one in each of
 /// so many parts of every key's range; as Sobol's points, which leave no part of all keys' ranges
-/// out, with digits exchanged at random. The last two know how many runs there will be.
-enum class SweepDesign { kUniform, kLatin, kSobol };
+/// out, with digits exchanged at random; or ever nearer to a limit that is seldom passed. The two
+/// before that know how many runs there will be.
+enum class SweepDesign { kUniform, kLatin, kSobol, kSubset };
 
 /// The runs of a sweep: every combination of the varied values, `draws` times.
 class SweepPlan {
@@ -34,12 +36,14 @@ class SweepPlan {
   /// After all of that. Throws InputError where Sobol's points are too many.
   void lay(SweepDesign design);
 
-  /// [-] Throws InputError beyond a thousand million.
+  /// [-] At most, of subset simulation. Throws InputError beyond a thousand million.
   std::int64_t size() const;
   std::vector<std::string> keys() const;
   /// All that a sweep is, for a person and to compare.
   std::string text() const;
-  /// "KEY=VALUE" of run `run`, keys() in order.
+  /// Which runs a subset simulation wants next, and what came of them; null: of another design.
+  SubsetSimulation* subset() { return subset_ ? &*subset_ : nullptr; }
+  /// "KEY=VALUE" of run `run`, keys() in order; of a subset simulation, of its next ones.
   std::vector<std::string> overrides(std::int64_t run) const;
 
  private:
@@ -61,6 +65,7 @@ class SweepPlan {
   std::int64_t draws_ = 1;
   std::uint64_t seed_ = 1;
   SweepDesign design_ = SweepDesign::kUniform;
+  std::optional<SubsetSimulation> subset_;
   std::vector<std::uint32_t> points_;  // Sobol's, of kPointBits, a run's after another
 };
 
@@ -70,7 +75,7 @@ struct SweepOptions {
   std::filesystem::path file;          // CSV; what it has already is not run again
   int workers = 1;                     // [-] runs at a time
   int rank = 0, ranks = 1;             // [-] of several sweeps that share the runs and a folder
-  std::optional<Figure> figure;        // that is told of all rows
+  std::optional<Figure> figure;        // that is told of all rows; a subset simulation's question
   double until = 0.0;                  // half of its interval, at which it is enough; 0: never
 };
 
@@ -85,11 +90,12 @@ struct SweepResult {
   std::int64_t not_good = 0;  // [-] of them: stopped by a check, refused, or not a valid scenario
   bool complete = false;      // the file has all runs, in order, or as many as are enough
   std::optional<Figure::Estimate> figure;
+  int levels = 0;  // [-] of a subset simulation
 };
 
 /// Runs what is missing. `stop` is looked at before every run; it and `shown` may be called
 /// by any thread, `shown` by one at a time. Throws InputError.
-SweepResult sweep(const SweepPlan& plan, const SweepOptions& options,
+SweepResult sweep(SweepPlan& plan, const SweepOptions& options,
                   const std::function<void(const SweepProgress&)>& shown,
                   const std::function<bool()>& stop);
 
