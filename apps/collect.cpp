@@ -88,6 +88,9 @@ int collectCommand(int argc, char** argv) {
         throw InputError(
             fmt::format("--select {}: no column begins so; --list names them", select[i]));
 
+    if (!series.rows.empty() && from > series.rows.back().t)
+      throw InputError(fmt::format("--from {}: the log ends at {} s", from, series.rows.back().t));
+
     std::ofstream file;
     if (!out.empty()) {
       file.open(out);

@@ -88,8 +88,8 @@ int controllerCommand(int argc, char** argv) {
   options.addBus(cli);
   options.addOut(cli);
   cli.add_option("--do", options.commands,
-                 "a line of the menu, as 'trajectory 3 z sine 200 0.5'; again for the next; then "
-                 "home")
+                 "a line of the menu, as 'trajectory 3 z sine 200 0.5'; again for the next, which waits "
+                 "until it is over, unless it ends in & ('admittance 10 &'); then home")
       ->allow_extra_args(false);
   cli.add_flag("--plant", options.plant, "start a plant too");
   cli.add_flag("--start", options.process.start, "run the scenario's program at once; no menu");

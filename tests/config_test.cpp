@@ -315,6 +315,15 @@ INSTANTIATE_TEST_SUITE_P(
             "606 degrees of freedom up to here, want at most 600"},
         Bad{"path_of_five", "z_sine", "program=[{path: {rows_m_deg: [[0, 0, 0, 0, 0]]}}]",
             "rows_m_deg[0]: has 5 entries, want 6"},
+        Bad{"row_that_is_none", "satellite_jets", "base.free.thrusters[0].firings_s=[1, 3]",
+            "firings_s[0]: is a single value, want a list of 2 numbers"},
+        Bad{"joint_too_fast", "puma_tilt",
+            "program=[{calibration: {}, robot: [{at_s: 0, joint: joint_1, to_deg_or_m: 90, "
+            "duration_s: 1}]}]",
+            "joint 'joint_1' would move at up to 168.8 deg/s, want at most 110: 1.53 s or more"},
+        Bad{"key_of_a_file", "puma_tilt", "robot.colour=red",
+            "unknown key, known here: adapter, adapter_position_m, encoders, gripper_switch, "
+            "joints, joints_deg_or_m, lock, mount_m, mount_rpy_deg, tip, urdf"},
         Bad{"path_of_nothing", "z_sine", "program=[{path: {rows_m_deg: []}}]",
             "rows_m_deg: want one or more rows of 6 numbers"},
         Bad{"admittance_of_a_slip", "z_sine", "program=[{admittance: {duration_s: 5, lasts: 1}}]",

@@ -281,6 +281,36 @@ TEST_F(Console, AScriptStopsAtWhatIsRefused) {
   EXPECT_EQ(o.text.find("move x 10"), std::string::npos) << o.text;
 }
 
+TEST_F(Console, AScriptKnowsWhetherTheRobotObeys) {
+  const Output taken = sh(session("--do 'robot joint_1 5 1' --do 'release' --out a"));
+  EXPECT_EQ(taken.status, 1) << taken.text;  // there is nothing in hand
+  EXPECT_NE(taken.text.find("> release\n"), std::string::npos) << taken.text;
+  EXPECT_NE(taken.text.find("the robot does not do that"), std::string::npos) << taken.text;
+  // Nobody has asked it to arm, and it has ended when it was told to.
+  EXPECT_EQ(taken.text.find("never armed"), std::string::npos) << taken.text;
+  EXPECT_EQ(taken.text.find("ended early"), std::string::npos) << taken.text;
+  const Output fast = sh(session("--do 'robot joint_1 90 0.5' --do 'wait 1' --out b"));
+  EXPECT_EQ(fast.status, 1) << fast.text;
+  EXPECT_NE(fast.text.find("joint 'joint_1' would move at"), std::string::npos) << fast.text;
+  EXPECT_EQ(fast.text.find("> wait"), std::string::npos) << fast.text;
+}
+
+TEST_F(Console, AScriptDoesNotWaitForWhatEndsInAnAmpersand) {
+  const Output o = sh(session("--do arm --do 'move in 2 x 20 &' --do 'wait 0.3' --do hold --out a"));
+  EXPECT_EQ(o.status, 0) << o.text;
+  const auto request = column(folder_ / "a/series.csv", "request");
+  const auto phase = column(folder_ / "a/series.csv", "phase");
+  const auto hold = std::find_if(request.begin(), request.end(),
+                                 [](const auto& row) { return row.second == "hold"; });
+  ASSERT_NE(hold, request.end());
+  EXPECT_EQ(phase.at(hold->first - 1), "running");
+  // The last of them is over before the session is.
+  const Output last = sh(session("--do arm --do 'move in 1 x 20&' --out b"));
+  EXPECT_EQ(last.status, 0) << last.text;
+  EXPECT_NE(last.text.find("holding  x +20.0"), std::string::npos) << last.text;
+  EXPECT_EQ(last.text.find("ended early"), std::string::npos) << last.text;
+}
+
 TEST_F(Console, BadInputIsSaidBeforeAnythingStarts) {
   for (const char* bad : {"--do 'trajectory 3 z sine 400 1'", "--do fly", "--do arm --start",
                           "--calibration none.yaml --do arm"}) {
@@ -385,6 +415,7 @@ TEST_F(Console, LinesOfTheMenuMayComeThroughAPipe) {
   const std::string piped = "bash -c \"" + whole + "\"";
   const Output o = sh(piped);
   EXPECT_EQ(o.status, 0) << o.text;
+  EXPECT_NE(o.text.find("holding  x +10.0"), std::string::npos) << o.text;
   EXPECT_NE(o.text.find("parked, legs at home"), std::string::npos) << o.text;
 }
 

@@ -72,8 +72,8 @@ TEST(Gate, ItsWorstIsTheWorstOfAllPosesAndBothDirections) {
   // Unfolded in the middle of its program, and back.
   const Experiment folds = test::experiment(
       "doss_on_table_4_1",
-      {"program=[{admittance: {duration_s: 9}, robot: [{at_s: 1, duration_s: 1, joint: joint_4, "
-       "to_deg_or_m: 0}, {at_s: 4, duration_s: 1, joint: joint_4, to_deg_or_m: 90}]}]"});
+      {"program=[{admittance: {duration_s: 9}, robot: [{at_s: 1, duration_s: 3, joint: joint_4, "
+       "to_deg_or_m: 0}, {at_s: 4, duration_s: 3, joint: joint_4, to_deg_or_m: 90}]}]"});
   for (const Experiment& e : {folds, test::experiment("srms_deploy_doss", kDiverging)}) {
     const LoopVerdict v = assessStability(e.controller, e.plant.task);
     double most = 0.0, of_last = 0.0;
@@ -133,7 +133,7 @@ TEST(Gate, LooksAtEveryPoseOfTheRobot) {
   }
   EXPECT_TRUE(stable(0.99 * lo, ""));
   EXPECT_FALSE(
-      stable(0.99 * lo, ", robot: [{at_s: 1, duration_s: 1, joint: joint_4, to_deg_or_m: 0}]"));
+      stable(0.99 * lo, ", robot: [{at_s: 1, duration_s: 3, joint: joint_4, to_deg_or_m: 0}]"));
 }
 
 TEST(Gate, BarsAdmittanceControlUnlessForced) {
@@ -210,9 +210,9 @@ TEST(Gate, LooksAtEachMotionWhateverElseThereIs) {
       "puma_on_table_4_1",
       {"program=[{trajectory: {duration_s: 0.1}, robot: [{at_s: 0, duration_s: 5, joint: joint_2, "
        "to_deg_or_m: 0}]}, {admittance: {duration_s: 400}, robot: [{at_s: 290, duration_s: 1, "
-       "joint: joint_3, to_deg_or_m: 60}, {at_s: 4, duration_s: 1, joint: joint_1, to_deg_or_m: "
+       "joint: joint_3, to_deg_or_m: 60}, {at_s: 4, duration_s: 2, joint: joint_1, to_deg_or_m: "
        "0}, "
-       "{at_s: 1, duration_s: 1, joint: joint_1, to_deg_or_m: 100}]}]"});
+       "{at_s: 1, duration_s: 2, joint: joint_1, to_deg_or_m: 100}]}]"});
   const auto poses = programRobots(e.controller, e.plant.task);
   const auto near = [&](int joint, double degrees) {
     return std::any_of(poses.begin(), poses.end(), [&](const ProgramRobot& one) {

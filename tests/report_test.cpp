@@ -122,7 +122,7 @@ TEST(VesOnTheArm, IsSrmsRobotLateByTheSensorWhenTheArmHardlyGives) {
       test::experiment("srms_unberth_doss",
                        {"gravity_m_per_s2=0", "sensor.noise=false",
                         "program=[{move: {}}, {calibration: {}}, {admittance: {duration_s: 6}, "
-                        "robot: [{at_s: 0, duration_s: 1, joint: joint_3, to_deg_or_m: -20}]}]"});
+                        "robot: [{at_s: 0, duration_s: 2.4, joint: joint_3, to_deg_or_m: -20}]}]"});
   std::get<ModalModel>(e.controller.vehicle.kind).Phi /= 8.0;
   InteractionOptions options;
   const Interaction i = interactionOf(e, options.duration);

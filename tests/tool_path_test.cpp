@@ -431,6 +431,18 @@ TEST(RobotOrders, APathIsPlannedBesideTheMachineFromWhereTheRobotIs) {
   orders.take(order, truth);
   EXPECT_NE(test::refusal([&] { orders.done(true); }).find("cannot be reached"), std::string::npos);
   EXPECT_FALSE(orders.done(true));
+  // Of rest the fastest instant of a fifth-order motion is 15/8 of the mean.
+  const double change = 0.5, most = e.robot.fastest(0), least = 1.875 * change / most;
+  const RobotMove by{0, truth.joints.q(0) + change, 0.0};
+  const auto lasting = [&](double seconds) { return RobotMove{by.joint, by.target, seconds}; };
+  EXPECT_TRUE(orders.take(lasting(least * 1.0001), truth));
+  EXPECT_NE(
+      test::refusal([&] { orders.take(lasting(least * 0.999), truth); }).find("would move at"),
+      std::string::npos);
+  plant::Truth moves = truth;  // one that has to turn round first goes faster after it
+  moves.joints.q_dot(0) = -0.9 * most;
+  EXPECT_THROW(orders.take(lasting(least * 1.0001), moves), InputError);
+  EXPECT_THROW(orders.take(RobotMove{6, 0.0, 1.0}, truth), InputError);
   // What needs no plan begins at once; a load is in the tool's frame.
   EXPECT_TRUE(orders.take(RobotMove{0, 1.0, 1.0}, truth));
   EXPECT_TRUE(orders.take(Release{}, truth));

@@ -236,6 +236,14 @@ TEST(Link, NobodyFillsAMachinesMemoryWithOrdersToItsRobot) {
   bus.here.drain();
   EXPECT_EQ(link.takeRobotOrders().size(), PlantLink::kRobotOrders);
   EXPECT_EQ(link.rejected(), 1000 - static_cast<std::int64_t>(PlantLink::kRobotOrders));
+  EXPECT_EQ(link.refusedRobotOrders(), link.rejected());
+  // One that cannot be is refused; one for another machine is its own affair.
+  robot_command_t order = toMessage(RobotOrder(RobotMove{0, 0.1, -1.0}), header({5, 1}, 0, 0));
+  bus.there.publish(channel::kRobot, order);
+  order.machine = 7;
+  bus.there.publish(channel::kRobot, order);
+  bus.here.drain();
+  EXPECT_EQ(link.refusedRobotOrders(), 1001 - static_cast<std::int64_t>(PlantLink::kRobotOrders));
 }
 
 TEST(Bus, WhatAHandlerThrowsComesUpInTheLoopThatReads) {

@@ -394,8 +394,10 @@ PlantLink::PlantLink(Bus& bus, const std::optional<Identity>& self) : bus_(bus),
                 [this](const std::string&, const void* data, std::uint32_t size) {
                   const auto message = decode<robot_command_t>(data, size);
                   const auto order = message ? fromMessage(*message) : std::nullopt;
-                  if (!order || !means(message->machine) || robot_orders_.size() >= kRobotOrders) {
+                  const bool ours = message && means(message->machine);
+                  if (!order || !ours || robot_orders_.size() >= kRobotOrders) {
                     ++rejected_;
+                    refused_robot_orders_ += ours;
                     return;
                   }
                   robot_orders_.push_back(*order);

@@ -196,6 +196,16 @@ struct Embedded {
 };
 constexpr Embedded kEmbedded[] = {{"urdf", "urdf_text"}, {"recording", "recording_text"}};
 
+}  // namespace
+
+std::string_view asWritten(std::string_view key) {
+  for (const Embedded& file : kEmbedded)
+    if (file.text_key == key) return file.key;
+  return key;
+}
+
+namespace {
+
 /// Replaces `from` and those of kEmbedded below by what they name.
 void resolve(Value& value, const std::filesystem::path& directory, int depth) {
   for (Value& child : value.children) resolve(child, directory, depth);

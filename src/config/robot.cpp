@@ -19,6 +19,25 @@ void requireInLimits(const Section& s, std::string_view key, const UrdfRobot& ro
                             link.lower / unit, link.upper / unit, jointUnitName(link.type)));
 }
 
+std::string whyTooFast(const UrdfRobot& robot, const RobotMove& move, const JointState& from) {
+  constexpr int kLooks = 200;  // [-] along the way
+  const int j = move.joint;
+  const PathPoint<1> begin{Eigen::Matrix<double, 1, 1>(from.q(j)),
+                           Eigen::Matrix<double, 1, 1>(from.q_dot(j)),
+                           Eigen::Matrix<double, 1, 1>(from.q_ddot(j))};
+  const Quintic<1> path(begin, Eigen::Matrix<double, 1, 1>(move.target), move.duration);
+  double peak = 0.0;
+  for (int i = 0; i <= kLooks; ++i)
+    peak = std::max(peak, std::abs(path.at(move.duration * i / kLooks).x_dot(0)));
+  const double most = robot.fastest(j);
+  if (peak <= most * (1.0 + 1e-9)) return "";
+  const JointType type = robot.model.jointLink(j).type;
+  return fmt::format(
+      "joint '{}' would move at up to {:.4g} {}/s, want at most {:.4g}: {} s or more",
+      robot.joint_names[static_cast<std::size_t>(j)], peak / jointUnit(type), jointUnitName(type),
+      most / jointUnit(type), fmt::format("{:.3g}", move.duration * peak / most));
+}
+
 /// [-] of the robot's frames: the tip, or the only frame that carries no other; -1: none.
 static int tipOf(const UrdfRobot& robot, const std::string& tip) {
   std::vector<bool> carries(robot.frames.size());
@@ -143,19 +162,28 @@ static plant::JointEncoderModel readEncoders(Section s, const RobotModel& robot)
   return out;
 }
 
+/// How it stands on the platform.
+static void readMounting(Section& s, Robot& robot) {
+  robot.X_PR = {Mat3::Identity(), s.vector("adapter_position_m", 3, -10.0, 10.0)};
+  robot.adapter_R = readBox(s.section("adapter"));
+  robot.X_RL0 = {rotation(s.vector("mount_rpy_deg", 3, -360.0, 360.0) * kDegree),
+                 s.vector("mount_m", 3, -10.0, 10.0)};
+}
+
+static void readJoints(Section& s, Robot& robot) {
+  robot.q = initialJoints(s, robot.urdf);
+  if (s.has("gripper_switch")) robot.gripper_switch = s.flag("gripper_switch");
+  if (s.has("encoders")) robot.encoders = readEncoders(s.section("encoders"), robot.urdf.model);
+}
+
 Robot readRobot(Section s, const Value& document) {
   Robot robot;
   const Value* text = document.find("robot")->find("urdf_text");
   if (!text) s.fail("urdf", "missing, want the robot's URDF file");
   const UrdfTree tree(s.text("urdf_text"), *text->file);
   robot.urdf = chosenRobot(s, tree);
-  robot.X_PR = {Mat3::Identity(), s.vector("adapter_position_m", 3, -10.0, 10.0)};
-  robot.adapter_R = readBox(s.section("adapter"));
-  robot.X_RL0 = {rotation(s.vector("mount_rpy_deg", 3, -360.0, 360.0) * kDegree),
-                 s.vector("mount_m", 3, -10.0, 10.0)};
-  robot.q = initialJoints(s, robot.urdf);
-  if (s.has("gripper_switch")) robot.gripper_switch = s.flag("gripper_switch");
-  if (s.has("encoders")) robot.encoders = readEncoders(s.section("encoders"), robot.urdf.model);
+  readMounting(s, robot);
+  readJoints(s, robot);
   s.finish();
   return robot;
 }
@@ -171,6 +199,7 @@ static bool looksLikeXml(const std::string& file) {
 }
 
 LoadedRobot loadRobot(const std::string& file, const std::vector<std::string>& overrides) {
+  if (!std::filesystem::exists(file)) throw InputError(file + ": no such file");
   Value document = parseDocument("{}", file);
   applyOverride(document, fmt::format("robot.{}={}", looksLikeXml(file) ? "urdf" : "from", file));
   for (const std::string& one : overrides) applyOverride(document, "robot." + one);
@@ -178,11 +207,17 @@ LoadedRobot loadRobot(const std::string& file, const std::vector<std::string>& o
   Section s(value, "robot");
   const Value* text = value.find("urdf_text");
   if (!text) s.fail("urdf", "missing, want the robot's URDF file");
-  LoadedRobot out;
-  out.file = *text->file;
-  out.robot = chosenRobot(s, UrdfTree(text->text, out.file));
-  out.q = initialJoints(s, out.robot);
-  return out;
+  Robot robot;
+  robot.urdf = chosenRobot(s, UrdfTree(s.text("urdf_text"), *text->file));
+  readJoints(s, robot);
+  // A description alone does not say how it is mounted.
+  constexpr std::string_view kMounting[] = {"adapter_position_m", "adapter", "mount_m",
+                                            "mount_rpy_deg"};
+  if (std::any_of(std::begin(kMounting), std::end(kMounting),
+                  [&](std::string_view key) { return s.has(key); }))
+    readMounting(s, robot);
+  s.finish();
+  return {*text->file, std::move(robot.urdf), robot.q};
 }
 
 }  // namespace ves

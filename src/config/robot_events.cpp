@@ -60,6 +60,7 @@ ToolOrder readToolOrder(Section& s) {
 RobotEvents::RobotEvents(Experiment& out)
     : robot_(out.robot),
       out_(out),
+      paths_(out.robot.model.joints, out.plant.task.initial_joints),
       q_(out.plant.task.initial_joints),
       stands_(out.plant.initial_pose) {}
 
@@ -108,6 +109,7 @@ void RobotEvents::moved(const Cue& cue, const RobotAction& action, std::int64_t 
     until_[static_cast<std::size_t>(move->joint)] = until;
   } else if (const auto* path = std::get_if<ToolMove>(&action)) {
     q_ = path->joints->end();
+    paths_ = JointPaths(robot_.model.joints, q_);
     until_.fill(until);
     path_until_ = until;
   }
@@ -128,6 +130,9 @@ void RobotEvents::readJoint(Section& s, const Cue& cue) {
   if (path_until_ > sinceStart(cue))
     s.fail("at_s", fmt::format("the tool path before it may last until {}",
                                secondsOf(path_until_ - began_)));
+  const std::string why = whyTooFast(robot_, move, paths_.at(sinceStart(cue)));
+  if (!why.empty()) s.fail("duration_s", why);
+  paths_.move(move, sinceStart(cue));
   moved(cue, move, sinceStart(cue) + std::llround(move.duration * 1e9));
 }
 

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "ves/config/experiment.hpp"
+#include "ves/planning/joint_paths.hpp"
 #include "ves/planning/tool_planner.hpp"
 
 namespace ves {
@@ -43,6 +44,7 @@ class RobotEvents {
   const UrdfRobot& robot_;
   Experiment& out_;
   std::unique_ptr<ToolPlanner> planner_;
+  JointPaths paths_;  // of joints that move one by one; tool paths are in it once they have ended
   JointVector q_;                                 // where the last motion of each joint ends
   std::array<std::int64_t, kMaxJoints> until_{};  // [ns] and when, since the program's start
   std::int64_t began_ = 0;                        // [ns] at least, the segment since then

@@ -184,12 +184,16 @@ Eigen::MatrixXd Section::matrix(std::string_view key, int rows, int cols, double
          fmt::format("want {} rows of {} numbers", rows < 0 ? "one or more" : std::to_string(rows),
                      cols < 0 ? "equally many" : std::to_string(cols)));
   if (cols < 0) cols = static_cast<int>(value.children[0].children.size());
-  if (cols == 0) fail(key, "the first row is empty");
+  if (cols == 0 && value.children[0].kind == Value::Kind::kList)
+    fail(key, "the first row is empty");
   Eigen::MatrixXd out(rows, cols);
   for (int i = 0; i < rows; ++i) {
     const Value& row = value.children[static_cast<std::size_t>(i)];
     const std::string path = fmt::format("{}{}[{}]", path_.empty() ? "" : path_ + ".", key, i);
-    if (row.kind != Value::Kind::kList || static_cast<int>(row.children.size()) != cols)
+    if (row.kind != Value::Kind::kList)
+      failAt(row, path, fmt::format("is {}, want a list of {}numbers", kindName(row),
+                                      cols > 0 ? fmt::format("{} ", cols) : ""));
+    if (static_cast<int>(row.children.size()) != cols)
       failAt(row, path, fmt::format("has {} entries, want {}", row.children.size(), cols));
     for (int j = 0; j < cols; ++j)
       out(i, j) = toNumber(row.children[static_cast<std::size_t>(j)],
@@ -244,7 +248,9 @@ void Section::finish() const {
                  [&](const std::string& known) { return !value_->find(known); });
     std::string meant = beginning(key, used_);
     if (meant.empty()) meant = nearest(key, missing);
-    fail(key, meant.empty() ? fmt::format("unknown key, known here: {}", fmt::join(used_, ", "))
+    std::set<std::string_view> known;
+    for (const std::string& one : used_) known.insert(asWritten(one));
+    fail(key, meant.empty() ? fmt::format("unknown key, known here: {}", fmt::join(known, ", "))
                             : fmt::format("unknown key, did you mean {}?", meant));
   }
 }

@@ -37,7 +37,9 @@ class Console {
         calibration_(experiment.source.calibration) {
     for (const std::string& line : options.commands) {
       try {
-        script_.push_back(parseCommand(line, experiment));
+        const std::size_t last = line.find_last_not_of(" \t");
+        const bool waits = last == std::string::npos || line[last] != '&';
+        script_.push_back({parseCommand(waits ? line : line.substr(0, last), experiment), waits});
       } catch (const InputError& error) {
         throw InputError(fmt::format("--do '{}': {}", line, error.what()));
       }
@@ -152,7 +154,7 @@ class Console {
       calibration_status_ = status;
       if (status == CalibrationStatus::kDone) keepCalibration(s);
       if (status == CalibrationStatus::kRefused) {
-        failed_ = failed_ || !script_.empty();
+        failed_ = failed_ || !terminal_;
         say(fmt::format("calibration refused: {}; the bias is as before",
                         stillnessViolation(s, experiment_)));
       }
@@ -218,7 +220,10 @@ class Console {
           if (!text) return;
           if (text->empty()) continue;
         }
-        if (!obey(parseCommand(*text, experiment_))) return;
+        const Command command = parseCommand(*text, experiment_);
+        if (!obey(command)) return;
+        // What comes through a pipe does not see when it is armed.
+        if (!terminal_ && command.verb == Verb::kArm) settle(true);
       } catch (const InputError& error) {
         say(error.what());
         if (!terminal_) failed_ = true;
@@ -250,11 +255,24 @@ class Console {
       case Verb::kTool:
       case Verb::kGrasp:
       case Verb::kRelease:
-      case Verb::kPush: session_->orderRobot(command.robot); break;
+      case Verb::kPush: askRobot(command.robot); break;
       case Verb::kQuit: return false;
       default: return give(command);
     }
     return true;
+  }
+
+  /// At a terminal the answer is news, whenever it comes.
+  void askRobot(const RobotOrder& order) {
+    const std::int64_t before = session_->robotOrders().answered();
+    session_->orderRobot(order);
+    const std::int64_t patience = monotonicNow() + kPatience;
+    const auto answered = [&] { return session_->robotOrders().answered() != before; };
+    while (!terminal_ && !answered() && !over() && monotonicNow() < patience)
+      session_->listen(kTurn);
+    if (terminal_ || answered() || over()) return;
+    say("the robot does not answer");
+    failed_ = true;
   }
 
   /// A program is run under attendance: it ends holding at home, and the menu goes on.
@@ -270,7 +288,7 @@ class Console {
       session_->listen(kTurn);
     if (phase_ == Phase::kArmed) return true;
     say("not armed");
-    failed_ = failed_ || !script_.empty();
+    failed_ = failed_ || !terminal_;
     return false;
   }
 
@@ -286,7 +304,7 @@ class Console {
       say("still asked of the stability check");
     } else if (*refusal != Refusal::kNone) {
       say(fmt::format("not taken: {}{}", name(*refusal), advice(*refusal)));
-      failed_ = failed_ || !script_.empty();
+      failed_ = failed_ || !terminal_;
     } else if (command.verb == Verb::kTare) {
       say(fmt::format("taking {} samples; then the bias slides over {} s", kCalibrationSamples,
                       experiment_.controller.tare_ramp));
@@ -303,29 +321,50 @@ class Console {
     }
   }
 
-  /// One after the other; each waits until what it started is over.
+  static bool moves(Verb verb) {
+    switch (verb) {
+      case Verb::kArm:
+      case Verb::kProgram:
+      case Verb::kAdmittance:
+      case Verb::kTrajectory:
+      case Verb::kMove:
+      case Verb::kCalibration:
+      case Verb::kHold:
+      case Verb::kStop: return true;
+      default: return false;
+    }
+  }
+
+  /// What was begun is over, or never will begin.
+  bool settled(bool arms) {
+    const auto& s = session_->state();
+    if (!s) return false;
+    const auto phase = static_cast<Phase>(s->phase);
+    if (phase == Phase::kStopped || phase == Phase::kParked) return true;
+    return phase == Phase::kArmed || (phase == Phase::kDisarmed && !arms);
+  }
+
+  /// A controller that cannot arm says why, and is not waited for.
+  void settle(bool arms) {
+    const std::int64_t patience = monotonicNow() + kPatience;
+    while (!over() && !settled(arms)) {
+      session_->listen(kTurn);
+      if (arms && phase_ == Phase::kDisarmed && monotonicNow() > patience) {
+        say("not armed");
+        failed_ = true;
+        return;
+      }
+    }
+  }
+
+  /// One after the other; each waits until what it started is over, unless it ends in `&`.
   void obeyScript() {
     for (std::size_t i = 0; i < script_.size() && !over() && !failed_; ++i) {
+      const auto& [command, waits] = script_[i];
       say("> " + options_.commands[i]);
-      const bool arms = script_[i].verb == Verb::kArm;
-      if (!obey(script_[i])) return;
-      const auto settled = [&] {
-        const auto& s = session_->state();
-        if (!s) return false;
-        const auto phase = static_cast<Phase>(s->phase);
-        if (phase == Phase::kStopped || phase == Phase::kParked) return true;
-        return phase == Phase::kArmed || (phase == Phase::kDisarmed && !arms);
-      };
-      // A controller that cannot arm says why, and is not waited for.
-      const std::int64_t patience = monotonicNow() + kPatience;
-      while (!over() && !settled()) {
-        session_->listen(kTurn);
-        if (arms && phase_ == Phase::kDisarmed && monotonicNow() > patience) {
-          say("not armed");
-          failed_ = true;
-          break;
-        }
-      }
+      if (!obey(command)) return;
+      if ((waits && moves(command.verb)) || i + 1 == script_.size())
+        settle(command.verb == Verb::kArm);
       if (phase_ == Phase::kStopped) failed_ = true;
       if (phase_ == Phase::kParked) {  // a stop: the controller lets go, and ends
         for (++i; i < script_.size(); ++i)
@@ -340,6 +379,11 @@ class Console {
     const auto* bytes = static_cast<const std::uint8_t*>(data);
     if (channel == channel::kSample) {
       if (const auto sample = decode<sample_t>(data, size)) temperature_ = sample->temperature;
+      const std::int64_t refused = session_->robotOrders().refused;
+      if (refused > std::exchange(refused_, refused)) {
+        say("the robot does not do that; the plant says why");
+        failed_ = failed_ || !terminal_;
+      }
     } else if (channel == channel::kTiming) {
       timing_ = decode<timing_t>(data, size);
     }
@@ -367,7 +411,12 @@ class Console {
                              return state ? coordinateText(i, state->x[i]) : "?";
                            }};
   bool terminal_;
-  std::vector<Command> script_;
+  struct Line {
+    Command command;
+    bool waits = true;
+  };
+  std::vector<Line> script_;
+  std::int64_t refused_ = 0;  // [-] orders, by the robot
   bool failed_ = false;
   std::string prompt_, input_;
   std::string status_;        // the line above an open prompt

@@ -169,7 +169,11 @@ std::string whyEarly(const Series& series) {
     return row.state.request == static_cast<int>(Request::kStop) &&
            row.state.phase == static_cast<int>(Phase::kReturning);
   });
-  if (stop != series.rows.end()) return fmt::format("a stop was requested at {:.2f} s", stop->t);
+  // One that holds, and has nothing left to do, is not cut short.
+  const bool idle = stop != series.rows.end() && stop != series.rows.begin() &&
+                    std::prev(stop)->state.phase == static_cast<int>(Phase::kArmed);
+  if (stop != series.rows.end() && !idle)
+    return fmt::format("a stop was requested at {:.2f} s", stop->t);
   const auto first = std::find_if(series.rows.begin(), series.rows.end(),
                                   [](const Row& row) { return row.state.aborted != 0; });
   if (first == series.rows.end()) return {};

@@ -319,6 +319,12 @@ nlohmann::ordered_json summarise(const Series& series, const RunResult& result,
     latched.forEach([&](Check check) { out["trips"].push_back(name(check)); });
   }
   if (const std::string why = whyEarly(series); !why.empty()) out["ended_early"] = why;
+  if (result.phase == Phase::kDisarmed)
+    out["arming_was_asked"] =
+        std::any_of(series.rows.begin(), series.rows.end(), [](const Row& row) {
+          const auto request = static_cast<Request>(row.state.request);
+          return request == Request::kArm || request == Request::kStart;
+        });
   out["first_cause"] = name(result.cause);
   out["first_cause_tick"] = result.cause_tick;
   for (const Row& row : series.rows)

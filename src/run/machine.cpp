@@ -42,6 +42,7 @@ class MachineProcess {
   PlantLink link_;
   devices::Machine machine_;
   RobotOrders robot_;
+  std::int64_t orders_taken_ = 0, orders_refused_ = 0;
   int refused_events_ = 0;
 };
 
@@ -49,12 +50,15 @@ class MachineProcess {
 void MachineProcess::moveRobot(bool wait) {
   constexpr const char* kNotNow = "it is in motion, elsewhere, or its hand is not free for that";
   const auto begin = [&](const std::optional<RobotAction>& action) {
-    if (action && !plant().moveRobot(*action)) throw InputError(kNotNow);
+    if (!action) return;
+    if (!plant().moveRobot(*action)) throw InputError(kNotNow);
+    ++orders_taken_;
   };
-  const auto refusable = [](const auto& act) {
+  const auto refusable = [&](const auto& act) {
     try {
       act();
     } catch (const InputError& error) {
+      ++orders_refused_;
       fmt::print(stderr, "plant: the robot does not do that: {}\n", error.what());
     }
   };
@@ -71,6 +75,8 @@ sample_t MachineProcess::publish(std::int64_t answers) {
     bus_.publish(channel::kTruth,
                  toMessage(plant().truth(), header(self_, sample.sequence, sample.time)));
   sample.answers = answers;
+  sample.robot_orders_taken = orders_taken_;
+  sample.robot_orders_refused = orders_refused_ + link_.refusedRobotOrders();
   if (!options_.lockstep) {  // there a command comes at its tick, by the simulated clock
     const PlantLink::Heard& heard = link_.lastHeard();
     sample.command_source = heard.source;

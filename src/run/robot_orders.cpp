@@ -8,7 +8,12 @@ namespace ves {
 RobotOrders::RobotOrders(const Experiment& experiment) : experiment_(experiment) {}
 
 std::optional<RobotAction> RobotOrders::take(const RobotOrder& order, const plant::Truth& truth) {
-  if (const auto* move = std::get_if<RobotMove>(&order)) return *move;
+  if (const auto* move = std::get_if<RobotMove>(&order)) {
+    if (move->joint >= experiment_.robot.model.joints) throw InputError("it has no such joint");
+    const std::string why = whyTooFast(experiment_.robot, *move, truth.joints);
+    if (!why.empty()) throw InputError(why);
+    return *move;
+  }
   if (std::holds_alternative<Release>(order)) return Release{};
   if (const auto* push = std::get_if<PushOrder>(&order)) {
     const std::string why = whyNotPushed(experiment_, *push);

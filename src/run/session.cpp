@@ -61,8 +61,12 @@ void Session::receive(const std::string& channel, const void* data, std::uint32_
                      .c_str(),
                  stderr);
   }
+  if (channel == channel::kSample) {
+    const auto sample = decode<sample_t>(data, size);
+    machine_ = sample->header.source;
+    robot_orders_ = {sample->robot_orders_taken, sample->robot_orders_refused};
+  }
   if (on_message_) on_message_(channel, data, size);
-  if (channel == channel::kSample) machine_ = decode<sample_t>(data, size)->header.source;
   if (channel != channel::kState) return;
   const auto state = decode<state_t>(data, size);
   if (!state || state->header.sequence < 0 || state->header.sequence > kMaxSequence) return;

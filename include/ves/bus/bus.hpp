@@ -273,6 +273,8 @@ class PlantLink {
   const Heard& lastHeard() const noexcept { return last_heard_; }
   /// At most kRobotOrders wait; what comes then is not let in.
   std::vector<RobotOrder> takeRobotOrders() { return std::exchange(robot_orders_, {}); }
+  /// For this machine, and not let in: implausible, or too many.
+  std::int64_t refusedRobotOrders() const noexcept { return refused_robot_orders_; }
   std::int64_t rejected() const noexcept { return rejected_; }
 
  private:
@@ -289,6 +291,7 @@ class PlantLink {
   std::int64_t sequence_ = -2;  // of the master's last command
   std::optional<std::pair<LegCommand, std::int64_t>> command_;
   std::vector<RobotOrder> robot_orders_;
+  std::int64_t refused_robot_orders_ = 0;
   std::int64_t rejected_ = 0;
 };
 

@@ -25,7 +25,7 @@
 namespace ves {
 
 /// Of all messages and of the columns of series.csv; readers refuse others.
-inline constexpr std::int32_t kSchema = 12;
+inline constexpr std::int32_t kSchema = 13;
 
 /// Who sends, and since when.
 struct Identity {

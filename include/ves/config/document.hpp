@@ -47,6 +47,9 @@ struct Value {
 /// Reads a file with everything it is made from, `from` and `urdf` replaced by what they name.
 Value loadDocument(const std::filesystem::path& path);
 
+/// A key as people write it: `urdf` for the key that has the file's text.
+std::string_view asWritten(std::string_view key);
+
 /// Parses text that stands for a file of this name; nothing else is read.
 Value parseDocument(const std::string& text, const std::string& name);
 

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "ves/config/document.hpp"
+#include "ves/contract/robot_order.hpp"
 #include "ves/robot/robot_model.hpp"
 
 namespace ves {
@@ -108,6 +109,10 @@ UrdfRobot chosenRobot(Section& s, const UrdfTree& tree);
 /// "joints_deg_or_m" of a robot's file, inside their limits [rad | m]; without it zero, or the
 /// limit next to it.
 JointVector initialJoints(Section& s, const UrdfRobot& robot);
+
+/// Why one joint may not move so: faster than its description allows, from where it is. Empty: it
+/// may.
+std::string whyTooFast(const UrdfRobot& robot, const RobotMove& move, const JointState& from);
 
 /// A robot alone, without a platform.
 struct LoadedRobot {

@@ -46,6 +46,7 @@ struct Sample {
   std::int64_t legs_time = 0, wrench_time = 0, joints_time = 0;
   std::uint32_t faults = 0;  // bits of Piece
   std::int64_t command_source = 0, command_tick = 0, command_time = 0;
+  std::int64_t robot_orders_taken = 0, robot_orders_refused = 0;
 
   /// [ns] of the piece that is oldest, when the sample was put together.
   std::int64_t oldest() const noexcept {

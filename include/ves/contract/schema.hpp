@@ -87,6 +87,9 @@ constexpr auto fields(S& s) {
             "the last command that came: its header.source; 0: none yet"},
       Field{"command_sequence", "-", s.command_tick, "its header.sequence"},
       Field{"command_time_ns", "ns", s.command_time, "when it came, by the machine's clock"},
+      Field{"robot_orders_taken", "-", s.robot_orders_taken,
+            "orders to the simulated robot that have begun, since the machine did"},
+      Field{"robot_orders_refused", "-", s.robot_orders_refused, "and those that never will"},
   };
 }
 
@@ -339,7 +342,7 @@ constexpr auto fields(S& s) {
   };
 }
 
-static_assert(members<Sample>() == 15 && members<LegCommand>() == 8 &&
+static_assert(members<Sample>() == 17 && members<LegCommand>() == 8 &&
                   members<MachineSetup>() == 17 && members<TickState>() == 53 &&
                   members<Order>() == 7 && members<VehicleOrder>() == 2 &&
                   members<VehicleFactors>() == 3 && members<VehicleVerdict>() == 2 &&

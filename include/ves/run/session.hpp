@@ -39,8 +39,14 @@ class Session {
   /// was something to read from the descriptor, which goes before.
   std::optional<Refusal> order(const Order& order, int descriptor = -1);
 
-  /// Asks something of the simulated robot.
+  /// Asks something of the simulated robot; robotOrders() tells whether it does it.
   void orderRobot(const RobotOrder& order);
+  /// By the newest sample.
+  struct RobotOrderCounts {
+    std::int64_t taken = 0, refused = 0;
+    std::int64_t answered() const { return taken + refused; }
+  };
+  const RobotOrderCounts& robotOrders() const { return robot_orders_; }
 
   /// A gentle end, as by Ctrl-C.
   void interrupt();
@@ -66,6 +72,7 @@ class Session {
   std::int64_t heard_ = 0;    // [-] states
   std::int64_t orders_ = 0;   // [-] given
   std::int64_t machine_ = 0;  // header.source of its samples; 0: none yet
+  RobotOrderCounts robot_orders_;
   RunResult result_;
   OnState on_state_;
   OnMessage on_message_;
