@@ -130,6 +130,13 @@ int servo(const std::string& log, const std::string& scenario, const std::string
              : "",
         found.residual(i) * 1e6);
   }
+  // Slow motions leave tau to the rounding of counts, which no deviation knows of.
+  const double tau = found.servo.tau.mean(), told = series.experiment.controller.servo.tau.mean();
+  if (!(tau < 1.5 * told && tau > told / 1.5))
+    fmt::print(stderr,
+               "warning: tau of {:.3g} ms, where the configuration says {:.3g}: slow motions do not "
+               "tell it; want a log of quick ones, as of servo_identification\n",
+               tau * 1e3, told * 1e3);
   if (all.sensor)
     fmt::print(
         "wrench: {:.0f} +- {:.0f} us later than the servos and its filter say; shows {:.4f} +- "

@@ -54,8 +54,10 @@ TEST_P(NoHeap, FromArmingToParking) {
        {"seed=1", kCompensated, "sensor.readings_per_tick=4", "legs.model=hydraulic",
         "base={mass_diagonal: [500,500,500,250,250,250], damping_diagonal: "
         "[500,400,300,200,100,90], stiffness_diagonal: [1500,2500,4000,1500,1000,2000]}"})
-    expectNoHeap(experiment(GetParam(), {base}));
+    expectNoHeap(experiment(GetParam(), {base, "base.weight=removed"}));
 }
+
+TEST(NoHeapOnAShip, FromArmingToParking) { expectNoHeap(experiment("ship_arm")); }
 
 TEST(NoHeapInFlight, FromArmingToParking) {
   expectNoHeap(

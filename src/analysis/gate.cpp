@@ -309,7 +309,9 @@ std::string explain(const LoopVerdict& v) {
           fmt::format("{}pressure feedback of {:.0f}/s", one.empty() ? "" : " with ", v.feedback);
     add(one);
   }
-  if (cure.empty()) cure = "a lighter robot or a heavier base";
+  if (cure.empty())
+    cure = v.worst.frequency > 0.0 ? "a lighter robot or a heavier base"
+                                   : "a lighter or lower robot, or a stiffer base";
   const double gives = v.extending.resonance.frequency / (2.0 * M_PI);
   return fmt::format(
       "the loop of base, robot and machine{} would diverge: {}, most in {} (legs {}). What cures "
@@ -375,9 +377,9 @@ VehicleVerdict assessChange(const ControllerConfig& controller, const RobotTask&
       const auto between = [&](double a, double b) { return a + share * (b - a); };
       ControllerConfig changed = controller;
       changed.compensation = compensation;
-      changed.vehicle = scaled(linearised(controller.vehicle),
-                               {between(from.mass, to.mass), between(from.damping, to.damping),
-                                between(from.stiffness, to.stiffness)});
+      changed.vehicle.kind = scaled(linearised(controller.vehicle),
+                                    {between(from.mass, to.mass), between(from.damping, to.damping),
+                                     between(from.stiffness, to.stiffness)});
       return !isStable(changed, task) || !contactsDecay(changed, task);
     };
     // The end first: it is what is refused most often.

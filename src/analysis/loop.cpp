@@ -30,6 +30,16 @@ Mat6 axesAlong(const Vec6& d) {
   return H;
 }
 
+/// The modes that the controller steps: the base's, with what of the robot is modelled on them.
+ModalModel emulated(const Loop& loop) {
+  const Loop::Model& own = loop.model;
+  const bool weighs = !loop.gravity.isZero(0.0);
+  if (!own.inertia && !weighs) return loop.base;
+  const RigidBody& robot = own.robot_P;
+  return withBody(loop.base, own.inertia ? own.M_1() : Mat6(Mat6::Zero()),
+                  stiffnessOfWeight(loop.gravity, robot.mass * robot.p_BoBcm_B));
+}
+
 /// What of a loop does not depend on the robot.
 struct Lifted {
   Channel channel;
@@ -59,7 +69,7 @@ MatrixXd systemOf(const Loop& loop, const Lifted& lifted, const Vec6* pushed = n
   const auto channel = [&](Index i) -> const Channel& {
     return i == 0 && loop.contact ? lifted.leaning : lifted.channel;
   };
-  const ModalModel base = own.inertia ? withBody(loop.base, own.M_1()) : loop.base;
+  const ModalModel base = emulated(loop);
   const Index n = lifted.channel.step.rows(), m = model.step.rows(), k = base.stiffness.size(),
               d = loop.delay;
   const MatrixXd& Phi = base.Phi;
@@ -176,6 +186,7 @@ std::vector<Direction> directionsOf(const ControllerConfig& controller) {
 Loop loopOf(const ControllerConfig& controller, const JointVector& q, Direction direction) {
   Loop loop;
   loop.base = linearised(controller.vehicle);
+  loop.gravity = controller.vehicle.gravity;
   loop.robot_P = lockedRobot(controller.payload, q);
   loop.period = static_cast<double>(controller.period) * kSecondPerNanosecond;
   Loop::Model& own = loop.model;
@@ -239,7 +250,7 @@ PushedLoop pushedLoop(const Loop& loop) {
   out.places.middleCols(2 * k, n) += places.leftCols(n);
   out.places *= direction.norm();
   const bool inside = loop.model.inertia;  // the base's modes carry the robot
-  const ModalModel base = inside ? withBody(loop.base, loop.model.M_1()) : loop.base;
+  const ModalModel base = emulated(loop);
   out.energy = MatrixXd::Zero(size, size);
   out.energy.diagonal().head(k) = 0.5 * base.stiffness;
   out.energy.diagonal().segment(k, k).setConstant(0.5);
@@ -261,7 +272,7 @@ DominantRoot dominantRoot(const Loop& loop) {
   out.radius = std::abs(root);
   out.growth = std::log(out.radius) / loop.period;
   out.frequency = std::abs(std::arg(root)) / (2.0 * M_PI * loop.period);
-  const ModalModel base = loop.model.inertia ? withBody(loop.base, loop.model.M_1()) : loop.base;
+  const ModalModel base = emulated(loop);
   const Eigen::Matrix<std::complex<double>, 6, 1> x =
       base.Phi * eigenvector(S, root).head(base.stiffness.size());
   Index largest = 0;
@@ -315,16 +326,24 @@ Margins margins(const Loop& loop) {
   return out;
 }
 
-/// xi = Q^T L^T eta, with 1 + Phi^T M_1 Phi = L L^T and L^-1 K L^-T = Q diag(stiffness) Q^T.
-ModalModel withBody(const ModalModel& base, const Mat6& M_1) {
+/// xi = Q^T L^T eta, with 1 + Phi^T M_1 Phi = L L^T and L^-1 (K + Phi^T K_1 Phi) L^-T =
+/// Q diag(stiffness) Q^T. What falls over has a negative one.
+ModalModel withBody(const ModalModel& base, const Mat6& M_1, const Mat6& K_1) {
   const Index k = base.stiffness.size();
   const MatrixXd mass = MatrixXd::Identity(k, k) + base.Phi.transpose() * M_1 * base.Phi;
   const Eigen::LLT<MatrixXd> llt(mass);
   const MatrixXd half = base.stiffness.cwiseSqrt().asDiagonal();
   const MatrixXd A = llt.matrixL().solve(half);  // L^-1 K^(1/2)
-  const auto [stiffness, Q] = symmetricEigen(A * A.transpose());
+  MatrixXd K = A * A.transpose();
+  const bool weighs = !K_1.isZero(0.0);
+  if (weighs) {
+    const MatrixXd shapes = llt.matrixL().solve(base.Phi.transpose());
+    K += shapes * K_1 * shapes.transpose();
+  }
+  auto [stiffness, Q] = symmetricEigen(K);
+  if (!weighs) stiffness = stiffness.cwiseMax(0.0).eval();
   const MatrixXd shapes = llt.matrixU().solve(Q);  // eta = shapes xi
-  return {base.Phi * shapes, stiffness.cwiseMax(0.0), shapes.transpose() * base.damping * shapes};
+  return {base.Phi * shapes, stiffness, shapes.transpose() * base.damping * shapes};
 }
 
 ModalModel softest(const ModalModel& base, int k) {

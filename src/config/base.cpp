@@ -370,6 +370,11 @@ Base readBase(Section s) {
       s.fail("ground", "the vehicle floats, want a ground under modes, an arm, or alone");
     out.vehicle.ground = readGround(s.section("ground"));
   }
+  if (s.has("weight") && s.choice("weight", {"removed", "felt"}) == "felt") {
+    if (linearised(out.vehicle).stiffness.size() == 0 || kind->key == "free")
+      s.fail("weight", "felt, and there are no springs to give way, want modes or removed");
+    out.feels_weight = true;
+  }
   s.finish();
   return out;
 }

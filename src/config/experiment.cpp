@@ -160,6 +160,17 @@ Experiment build(const Value& document, AskedKey* asked = nullptr) {
   c.safety.alone = static_cast<double>(p.watchdog.park_after) * kSecondPerNanosecond;
   const Base base = readBase(root.section("base"));
   c.vehicle = base.vehicle;
+  if (base.feels_weight) {
+    const auto refuse = [&](const char* why) { root.section("base").fail("weight", why); };
+    if (c.gravity.isZero(0.0)) refuse("felt, and gravity_m_per_s2 is 0");
+    if (!c.compensation.inertia)
+      refuse("felt: the robot's is known with its inertia, want controller.compensation.inertia");
+    if (c.compensation.learns_masses)
+      refuse("felt: masses that are learnt move it, want learns_masses: false");
+    if (root.has("environment") && root.section("environment").has("target"))
+      refuse("felt, and the environment's target floats, want one of the two");
+    c.vehicle.gravity = c.gravity;
+  }
   if (const ModalModel modes = linearised(c.vehicle);
       c.compensation.inertia && modes.stiffness.size() > 0) {
     const double fastest = std::sqrt(modes.stiffness.maxCoeff()), damping = modes.damping.norm();

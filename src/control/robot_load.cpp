@@ -105,7 +105,8 @@ Wrench RobotInertia::update(const KnownPayload& known, std::int64_t count, const
     return combine(RigidBody{}, known.payload().X_PL0(), compositeBody(known.carried(), at));
   };
   const auto seen = [&](const Mat3& R, const RigidBody& composite_P) -> Seen {
-    return {scale_ * spatialMass(rotated(R, composite_P)), R};
+    return {scale_ * spatialMass(rotated(R, composite_P)), R,
+            composite_P.mass * composite_P.p_BoBcm_B};
   };
   const bool flies = R_EP != X_IP.R;
   if (other) {  // which has moved as before: its momentum loses nothing on the way

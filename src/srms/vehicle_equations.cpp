@@ -34,10 +34,14 @@ ModalEquations::ModalEquations(const ModalModel& base, const Interaction& intera
                                const InteractionOptions& options)
     : base_(base),
       ground_(interaction.vehicle.ground),
+      gravity_(interaction.vehicle.gravity),
       options_(options),
       p_IH_(interaction.p_IH),
       eta_(leastSquares(base.Phi, interaction.start - ground_.at(0.0).x)),
-      rest_(interaction.start - ground_.at(0.0).x - base.Phi * eta_) {}
+      rest_(interaction.start - ground_.at(0.0).x - base.Phi * eta_) {
+  const RigidBody robot_P = lockedRobot(interaction.payload, interaction.q0);
+  at_home_ = workOfWeight(gravity_, robot_P.mass, robot_P.mass * robot_P.p_BoBcm_B, Vec3::Zero());
+}
 
 VectorXd ModalEquations::start(const RidingRobot&) const {
   VectorXd y = VectorXd::Zero(size());
@@ -80,7 +84,21 @@ void ModalEquations::derivative(const RidingRobot& robot, const VectorXd& y, con
   const PathPoint<6> ground = ground_.at(robot.t);
   if (const Vec6 F = F_Po_I.stacked(); !F.isZero(0.0)) right += jacobian(y, ground).transpose() * F;
   if (ground_.moves()) right -= leastSquares(base_.Phi, ground.x_ddot);
+  if (!gravity_.isZero(0.0)) weight(robot, y, right);
   dy.segment(k, k) = solvePositive(A, right);
+}
+
+/// Of the robot, beyond what it is in balance with, and by the ground's tilt of the vehicle itself.
+void ModalEquations::weight(const RidingRobot& robot, const VectorXd& y, VectorXd& right) const {
+  const PathPoint<6> ground = ground_.at(robot.t);
+  const RigidBody all = ves::lockedInP(robot);
+  Vec6 own = Vec6::Zero();
+  own.head<3>() = rotation(Vec3(ground.x.tail<3>())).transpose() * gravity_ - gravity_;
+  const Vec3 rpy = (coordinates(y, ground) - ground.x).tail<3>();
+  right +=
+      base_.Phi.transpose() *
+      (workOfWeight(gravity_ + own.head<3>(), all.mass, all.mass * all.p_BoBcm_B, rpy) - at_home_);
+  right += leastSquares(base_.Phi, own);
 }
 
 void ModalEquations::tell(const RidingRobot& robot, const VectorXd& y, InteractionPoint& p) const {

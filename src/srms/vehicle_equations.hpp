@@ -54,8 +54,12 @@ class ModalEquations {
   void whole(const RidingRobot& robot, const Eigen::VectorXd& y, Eigen::MatrixXd& A,
              Eigen::VectorXd& right) const;
 
+  void weight(const RidingRobot& robot, const Eigen::VectorXd& y, Eigen::VectorXd& right) const;
+
   const ModalModel& base_;
   const GroundMotion& ground_;
+  Vec3 gravity_;  // [m/s^2] felt, in I
+  Vec6 at_home_;  // work of weight that the springs are in balance with
   const InteractionOptions& options_;
   Vec3 p_IH_;
   Eigen::VectorXd eta_;        // where it is let go

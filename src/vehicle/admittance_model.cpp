@@ -18,7 +18,7 @@ AdmittanceModel::AdmittanceModel(const VehicleModel& model, double period)
         if (const auto* free = std::get_if<FreeBodyModel>(&model.kind))
           return Kinds(std::in_place_type<FreeBody>, *free, period);
         return Kinds(std::in_place_type<ModalVehicle>, std::get<ModalModel>(model.kind), period,
-                     model.ground);
+                     model.ground, model.gravity);
       }()) {}
 
 }  // namespace ves

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <utility>
 
 #include "ves/kinematics/stewart.hpp"
 #include "ves/math/dense.hpp"
@@ -198,11 +199,31 @@ ModalDynamics::Modes ModalDynamics::advance(const Body& body, double dt, const M
   return sum;
 }
 
-ModalVehicle::ModalVehicle(const ModalModel& model, double period, const GroundMotion& ground)
+Vec6 workOfWeight(const Vec3& gravity, double mass, const Vec3& moment_P,
+                  const Vec3& rpy) noexcept {
+  const Vec3 n = (rotation(rpy) * moment_P).cross(gravity);
+  return (Vec6() << mass * gravity, angleRateMap(rpy).transpose() * n).finished();
+}
+
+/// Second derivatives of -g . Rz Ry Rx s, where none of them turns.
+Mat6 stiffnessOfWeight(const Vec3& gravity, const Vec3& moment_P) noexcept {
+  Mat6 out = Mat6::Zero();
+  for (int i = 0; i < 3; ++i)
+    for (int j = i; j < 3; ++j)
+      out(3 + i, 3 + j) = out(3 + j, 3 + i) =
+          -gravity.dot(Vec3::Unit(j).cross(Vec3::Unit(i).cross(moment_P)));
+  return out;
+}
+
+ModalVehicle::ModalVehicle(const ModalModel& model, double period, const GroundMotion& ground,
+                           const Vec3& felt_gravity)
     : nominal_(model),
       dynamics_(nominal_),
       Phi_pinv_(leastSquares(model.Phi, Mat6::Identity())),
       ground_(ground),
+      gravity_(felt_gravity),
+      weighs_(!felt_gravity.isZero(0.0)),
+      shakes_(weighs_ || ground.moves()),
       period_(period),
       step_(dynamics_.hold(period)) {
   now_.modes = dynamics_.atRest();
@@ -241,11 +262,33 @@ void ModalVehicle::reset(const Vec6& x, const Mat6& M_1, double ahead) noexcept 
   now_.motion = {};
   now_.motion.x = x;
   E_.setIdentity();
+  balanced_ = false;
   if (!(ahead > 0.0)) return;
   E_ = angleRateMap(x.tail<3>());
   const ModalDynamics light = dynamics_.withoutDampingAbove(kMostGrowth / ahead);
-  const ModalDynamics::Forces none = ModalDynamics::Forces::Zero(dynamics_.size());
-  modes = light.advance(light.body(working(M_1) / factors_.mass), -ahead, modes, none);
+  ModalDynamics::Forces u = ModalDynamics::Forces::Zero(dynamics_.size());
+  if (weighs_) {  // by M_1, until a step tells better
+    const Mat3 mc = M_1.bottomLeftCorner<3, 3>();
+    const Vec3 moment_P =
+        rotation(Vec3(x.tail<3>())).transpose() * Vec3(mc(2, 1), mc(0, 2), mc(1, 0));
+    at_home_ = workOfWeight(gravity_, M_1(0, 0), moment_P, Vec3::Zero());
+    u = weightAt(M_1(0, 0), moment_P, x, now_.ground);
+  }
+  modes = light.advance(light.body(working(M_1) / factors_.mass), -ahead, modes, u);
+}
+
+ModalDynamics::Forces ModalVehicle::weightAt(double mass, const Vec3& moment_P, const Vec6& x,
+                                             const PathPoint<6>& ground) const noexcept {
+  // In the axes of what it stands on, which gravity turns away from.
+  Vec6 own = Vec6::Zero();  // [m/s^2]
+  own.head<3>() = rotation(Vec3(ground.x.tail<3>())).transpose() * gravity_ - gravity_;
+  const Vec3 rpy = (x - ground.x).tail<3>();
+  const Vec6 body = workOfWeight(gravity_ + own.head<3>(), mass, moment_P, rpy) - at_home_;
+  ModalDynamics::Forces out;
+  out.noalias() = dynamics_.Phi().transpose() * body;
+  out /= factors_.mass;
+  out.noalias() += Phi_pinv_ * own;
+  return out;
 }
 
 void ModalVehicle::step(const Wrench& F_Po_I, double damping) noexcept {
@@ -291,7 +334,8 @@ void ModalVehicle::step(const Wrench& F_Po_I, const CarriedBody& carried, double
     now_.time += dt;
     now_.ground = ground_.at(now_.time);
   }
-  E_ = angleRateMap(coordinates(middle, now_.ground).tail<3>());
+  const Vec6 x_middle = coordinates(middle, now_.ground);
+  E_ = angleRateMap(x_middle.tail<3>());
   lost -= carried.M_1.rightCols<3>() * (E_ * angleRates(before_));
   const Mat6 M_1_per_mass = working(carried.M_1) / factors_.mass;
   const ModalDynamics::Body body = dynamics_.body(M_1_per_mass);
@@ -318,13 +362,28 @@ void ModalVehicle::step(const Wrench& F_Po_I, const CarriedBody& carried, double
     u_then += mean(now_.ground, then, ahead);
     u += drag_;
   }
+  ModalDynamics::Forces weight;
+  if (weighs_) {
+    if (!std::exchange(balanced_, true))
+      at_home_ = workOfWeight(gravity_, carried.mass, carried.moment_P, Vec3::Zero());
+    weight = weightAt(carried.mass, carried.moment_P, x_middle, now_.ground);
+    if (!ground_.moves()) drag_.setZero();
+    drag_ += weight;
+    u += weight;
+    u_then += weight;
+  }
   now_.modes = dynamics_.advance(body, dt, before_.modes, u);
   const Modes later = dynamics_.advance(body, ahead, now_.modes, u_then);
-  if (ground_.moves()) u_then = u - drag_ + dragAt(then.x_ddot, M_1_per_mass);
+  if (ground_.moves()) {
+    u_then = u - drag_ + dragAt(then.x_ddot, M_1_per_mass);
+    if (weighs_) u_then += weight;
+  }
   now_.motion = at(later, dynamics_.acceleration(body, later, u_then), then);
   if (damped() < 0.0) {
     now_ = before_;
-    step(F_Po_I, carried.M_1, dt, ahead, 0.0);
+    CarriedBody kept = carried;
+    kept.before = carried.M_1;
+    step(F_Po_I, kept, dt, ahead, 0.0);
   }
 }
 

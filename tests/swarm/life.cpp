@@ -41,6 +41,9 @@ struct Scenario {
   bool robot, arm;  // has a robot; its base is the Shuttle's arm
 
   bool floats() const { return std::string_view(name).starts_with("satellite"); }
+  bool ship() const { return name == std::string_view("ship_arm"); }
+  /// On a base that may give way under the robot's weight.
+  bool leans() const { return ship() || std::string_view(name).ends_with("_on_table_4_1"); }
 };
 constexpr Scenario kScenarios[] = {
     {"z_sine", false, false},
@@ -72,10 +75,11 @@ std::vector<std::string> drawSettings(Dice& dice, const Scenario& scenario) {
     if (dice.chance(p)) put(key, value);
   };
   const std::string c = "controller.compensation.";
-  bool aided = false, learns = false;
+  bool aided = false, learns = false, compensated = scenario.ship();
   if (dice.chance(0.7)) {
     put(c + "feed_forward", dice.chance(0.8) ? "true" : "false");
     const bool observer = dice.chance(0.7), inertia = observer && dice.chance(0.7);
+    compensated = inertia;
     put(c + "observer", observer ? "true" : "false");
     put(c + "inertia", inertia ? "true" : "false");
     put(c + "wrench", "raw");
@@ -135,7 +139,12 @@ std::vector<std::string> drawSettings(Dice& dice, const Scenario& scenario) {
     maybe(0.25, "legs.filters", "outputs");
   }
   maybe(0.2, "sensor.noise", "false");
-  maybe(0.3, "gravity_m_per_s2", "0");
+  const bool in_space = dice.chance(0.3);
+  if (in_space) put("gravity_m_per_s2", "0");
+  if (scenario.leans()) {
+    const bool may = compensated && !learns && !in_space;
+    put("base.weight", may && dice.chance(0.5) ? "felt" : "removed");
+  }
   if (dice.chance(0.3))
     put("plant_mismatch",
         fmt::format("{{gain_extend: {:.3f}, gain_retract: {:.3f}, mass: {:.3f}}}",

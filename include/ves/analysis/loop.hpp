@@ -44,6 +44,7 @@ struct Leaning {
 
 struct Loop {
   ModalModel base;
+  Vec3 gravity = Vec3::Zero();   // [m/s^2] that the base feels of the robot, in I
   RigidBody robot_P;             // what the sensor carries, joints locked
   double period = 0.0;           // [s] of the controller
   double velocity_gain = 0.0;    // [1/s] of the servo, speed per error of length
@@ -160,7 +161,7 @@ PushedLoop pushedLoop(const Loop& loop);
 
 /// The base with a rigid body M_1 on it, which is a modal model again: the left-hand side of
 /// (3.11).
-ModalModel withBody(const ModalModel& base, const Mat6& M_1);
+ModalModel withBody(const ModalModel& base, const Mat6& M_1, const Mat6& K_1 = Mat6::Zero());
 
 /// The softest k modes of a base.
 ModalModel softest(const ModalModel& base, int k);

@@ -17,6 +17,7 @@ struct Base {
   VehicleModel vehicle;           // by the modes that are kept, or a body that floats
   std::optional<ArmModel> arm;    // that they are of
   std::optional<ArmShape> shape;  // of the arm, by the same modal coordinates
+  bool feels_weight = false;      // of what stands on it
 };
 
 /// One of four: `mass`, `damping`, `stiffness` (6 x 6); `modes`, a table from elsewhere; `arm`, a

@@ -103,6 +103,8 @@ class RobotInertia {
     out.joints = share_ * joints;
     out.R_IP_before = E_before_.R;
     out.R_IP = E_.R;
+    out.mass = composite_P_.mass;
+    out.moment_P = 0.5 * (E_before_.moment_P + E_.moment_P);
     return out;
   }
   /// Of the platform in I, when the newest sample was taken, its accelerations as the wrench shows
@@ -120,6 +122,7 @@ class RobotInertia {
   struct Seen {                                    // in I or E
     Mat6 whole = Mat6::Zero();                     // M_1 of all of it
     Mat3 R = Mat3::Identity();                     // of P, where it was so
+    Vec3 moment_P = Vec3::Zero();                  // [kg m] first, about Po
   };
   Seen I_, I_before_, E_, E_before_;
   double since_ = 0.0;  // [s] between the two

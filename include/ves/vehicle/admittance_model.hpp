@@ -19,7 +19,8 @@ struct VehicleModel {
   VehicleModel(const FreeBodyModel& model) : kind(model) {}
 
   std::variant<ModalModel, FreeBodyModel> kind;
-  GroundMotion ground;  // that it stands on; a body that floats stands on none
+  GroundMotion ground;          // that it stands on; a body that floats stands on none
+  Vec3 gravity = Vec3::Zero();  // [m/s^2] in I, of which it feels what is on it; 0: taken out
 
   bool operator==(const VehicleModel&) const = default;
 };
@@ -125,7 +126,7 @@ class AdmittanceModel {
   double dissipated() const noexcept {
     return each([](const auto& v) { return v.dissipated(); });
   }
-  /// [J] that the ground put into energy() in it.
+  /// [J] that ground and weight put into energy() in it.
   double shaken() const noexcept {
     return each([](const auto& v) { return v.shaken(); });
   }

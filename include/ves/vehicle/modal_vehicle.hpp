@@ -129,7 +129,17 @@ struct CarriedBody {
   // Attitudes of the platform that the two were seen at: how it lies on the vehicle.
   Mat3 R_IP_before = Mat3::Identity(), R_IP = Mat3::Identity();
   Vec6 joints = Vec6::Zero();  // [N s, N m s] momentum of the robot's joints beside it
+  // What has weight: all of it, whatever of its inertia is not in the wrench.
+  double mass = 0.0;             // [kg]
+  Vec3 moment_P = Vec3::Zero();  // [kg m] first, about Po in P, amid the step
 };
+
+/// What weight does on the coordinates of a platform turned by `rpy` on what it stands on, in whose
+/// axes gravity [m/s^2] is: the body's mass [kg], its first moment [kg m] about Po in P. [N, N m]
+Vec6 workOfWeight(const Vec3& gravity, double mass, const Vec3& moment_P, const Vec3& rpy) noexcept;
+/// How much stiffer that makes the vehicle near home; what stands may fall over. [N m/rad] of the
+/// angles, 0 else.
+Mat6 stiffnessOfWeight(const Vec3& gravity, const Vec3& moment_P) noexcept;
 
 /// Steps a modal model by the exact zero-order hold. Coordinates are those of Pose about home.
 /// Without a body they are taken as small: the wrench's moments drive the fixed angles directly, as
@@ -142,10 +152,15 @@ struct CarriedBody {
 /// On a ground that moves by g, x = Phi eta + g: springs and dampers pull at what is beside it, and
 /// vehicle and body have to be accelerated with it. Without modes the vehicle goes as the ground
 /// does.
+///
+/// Under gravity that it feels, the weight of the body on it moves it: at home, with the body as it
+/// is when it is let go, it is in balance. Its own weight it feels by the ground's tilt alone; what
+/// else that does is in its stiffness.
 class ModalVehicle {
  public:
   /// Discretises for the period [s].
-  ModalVehicle(const ModalModel& model, double period, const GroundMotion& ground = {});
+  ModalVehicle(const ModalModel& model, double period, const GroundMotion& ground = {},
+               const Vec3& felt_gravity = Vec3::Zero());
 
   /// motion() is at rest at x. What the modes cannot express of x stays as a constant offset. Where
   /// motion() is predicted `ahead` [s] of the modes, these are propagated back by `ahead` along the
@@ -200,9 +215,9 @@ class ModalVehicle {
     if (ground_.moves()) way += now_.ground.x - before_.ground.x;
     return working(F_Po_I).dot(way);
   }
-  /// [J] that the ground put into energy() in it.
+  /// [J] that ground and weight put into energy() in it.
   double shaken() const noexcept {
-    return ground_.moves() ? factors_.mass * drag_.dot(now_.modes.eta - before_.modes.eta) : 0.0;
+    return shakes_ ? factors_.mass * drag_.dot(now_.modes.eta - before_.modes.eta) : 0.0;
   }
   /// [J] that the base's own damping took in it, the speed taken as a line.
   double dissipated() const noexcept {
@@ -248,6 +263,9 @@ class ModalVehicle {
   Vec3 angleRates(const State& state) const noexcept;  // [rad/s]
   /// Of an acceleration of the ground, with the body M_1 per mass, on the coordinates.
   ModalDynamics::Forces dragAt(const Vec6& g_ddot, const Mat6& M_1_per_mass) const noexcept;
+  /// Of weight, of a body and its own, on the coordinates, per mass.
+  ModalDynamics::Forces weightAt(double mass, const Vec3& moment_P, const Vec6& x,
+                                 const PathPoint<6>& ground) const noexcept;
   /// On the coordinates, stacked.
   Vec6 working(const Wrench& F_Po_I) const noexcept {
     return (Vec6() << F_Po_I.f, E_.transpose() * F_Po_I.n).finished();
@@ -261,13 +279,17 @@ class ModalVehicle {
   VehicleFactors factors_;
   Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::RowMajor, kMaxModes, 6> Phi_pinv_;
   GroundMotion ground_;
+  Vec3 gravity_;                  // [m/s^2] felt, in I
+  bool weighs_, shakes_;          // it is, and the ground moves or it is
+  Vec6 at_home_ = Vec6::Zero();   // work of weight that the springs are in balance with
+  bool balanced_ = false;         // which is known, since it was let go
   double period_ = 0.0;           // [s]
   double dt_ = 0.0;               // [s] of the last step
   Mat6 mobility_ = Mat6::Zero();  // [1/kg] in it: acceleration per wrench, per mass
   Hold step_;
   State now_, before_;             // before the last step
   ModalDynamics::Forces damping_;  // in the last step, per mass
-  ModalDynamics::Forces drag_;     // of the ground in it, per mass
+  ModalDynamics::Forces drag_;     // of ground and weight in it, per mass
   Mat3 E_ = Mat3::Identity();      // angleRateMap amid the last step; none without a body
   Vec6 offset_ = Vec6::Zero();
 };
