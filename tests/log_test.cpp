@@ -212,6 +212,11 @@ TEST_F(Log, AFullDiskLosesWholeEventsAndKeepsTheFileWhole) {
   EXPECT_EQ(std::ssize(left) + lost, 1000);
 }
 
+TEST_F(Log, AFileThatCannotBeIsRefusedWithItsReason) {
+  EXPECT_EQ(test::refusal([] { LogWriter("/nonexistent/a.lcmlog"); }),
+            "/nonexistent/a.lcmlog: cannot be written: No such file or directory");
+}
+
 TEST_F(Log, AnEventReachesTheFileWithinHalfASecondOfLaterOnes) {  // a kill takes no more
   LogWriter writer(file_.string());
   for (int i = 0; i <= 500; ++i) {

@@ -13,6 +13,7 @@
 #include "support/rig.hpp"
 #include "support/robots.hpp"
 #include "ves/bus/channels.hpp"
+#include "ves/contract/plausible.hpp"
 #include "ves/evaluation/drift_samples.hpp"
 #include "ves/run/replay.hpp"
 #include "ves/run/run.hpp"
@@ -31,6 +32,21 @@ TEST(Orders, NothingMovesWithoutOne) {
   Rig rig(experiment("z_sine"));
   for (int i = 0; i < 500; ++i) ASSERT_FALSE(rig.tick().command.engaged);
   EXPECT_EQ(rig.state().phase, Phase::kDisarmed);
+}
+
+TEST(Orders, WhatIsNoneIsNotLetIn) {
+  for (const Request request : {Request::kNone, Request::kOvertaken, Request::kCount}) {
+    Order order;
+    order.request = request;
+    order.id.sequence = 0;
+    EXPECT_FALSE(plausible(order)) << static_cast<int>(request);
+  }
+  Order arm;
+  arm.request = Request::kArm;
+  arm.id.sequence = 0;
+  EXPECT_TRUE(plausible(arm));
+  arm.id.sequence = -1;
+  EXPECT_FALSE(plausible(arm));
 }
 
 TEST(Orders, ArmingHoldsTheMeasuredPoseUntilTold) {

@@ -609,13 +609,30 @@ TEST(LegCommander, WhatRoundingLeftIsNotSentOnceItRests) {
   c.compensation.observer = true;
   Sender to(c);
   const double count = c.legs.scale(0), between = 1.5 + 0.3 * count;
-  for (int n = 0; n < 2; ++n) to.send(moving(between, 0.0), c.periodSeconds());  // 0.6 are owed
+  // 0.3 of a count are owed: with as much once more it would be the next one.
+  to.send(moving(between, 0.0), c.periodSeconds());
   to.send(moving(between, 0.0), 0.0);
   EXPECT_EQ(to.commander.command().counts, legCounts(c.legs, to.commander.reference()));
-  for (int n = 0; n < 2; ++n) to.send(moving(between, 0.0), c.periodSeconds());
+  to.send(moving(between, 0.0), c.periodSeconds());
   to.commander.hold();
   to.send(moving(between, 0.0), c.periodSeconds());
   EXPECT_EQ(to.commander.command().counts, legCounts(c.legs, to.commander.reference()));
+  to.send(moving(between, 0.0), c.periodSeconds());  // and while it goes on it is sent
+  EXPECT_NE(to.commander.command().counts, legCounts(c.legs, to.commander.reference()));
+}
+
+TEST(LegEstimator, KnowsHowFarItsModelIsBehind) {
+  const ControllerConfig c = puma();
+  Sample s = numbered(0);
+  s.time = 5'000'000'000;
+  s.legs = legCounts(c.legs, legLengths(c.geometry, c.geometry.fromHome({})));
+  SampleStream samples(c.period);
+  samples.update(s, s.time, false, false);
+  LegEstimator estimator(c);
+  estimator.update(samples, {}, false, LegCommander(c));
+  EXPECT_NEAR(estimator.age(s.time + 7'000'000), 0.007, 1e-12);
+  EXPECT_EQ(estimator.age(s.time - 1), 0.0);
+  EXPECT_NEAR(estimator.age(s.time + 1'000'000'000), 5.0 * c.periodSeconds(), 1e-12);
 }
 
 // Other memories

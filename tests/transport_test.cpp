@@ -314,6 +314,39 @@ TEST_F(PrivateBus, ControllerKeepsTheNewestSampleOfTheNewestPlant) {
   EXPECT_TRUE(link.takeConflict());
 }
 
+TEST_F(PrivateBus, SamplesThatAreNotTakenAreCountedByTheirCause) {
+  Bus machine(kDefaultUrl), controller(kDefaultUrl);
+  ControllerLink link(controller, {9, 9});
+  std::int64_t sent = 0;
+  const auto send = [&](std::int64_t sequence, const Identity& from, const auto& spoil) {
+    Sample s = goodSample();
+    s.sequence = sequence;
+    sample_t m = toMessage(s, from);
+    spoil(m);
+    machine.publish(channel::kSample, m);
+    ++sent;
+  };
+  const auto as_it_is = [](sample_t&) {};
+  send(5, {1, 100}, as_it_is);
+  settle(machine, controller, [&] { return link.sample().sequence == 5; });
+  for (int i = 0; i < 2; ++i) send(6, {1, 100}, [](sample_t& m) { m.temperature = 1e9; });
+  for (int i = 0; i < 3; ++i) send(7, {2, 50}, as_it_is);
+  for (int i = 0; i < 4; ++i) send(4, {1, 100}, as_it_is);
+  settle(machine, controller, [&] { return link.rejected() == sent - 1; });
+  EXPECT_EQ(link.samplesRejected().malformed, 0);
+  EXPECT_EQ(link.samplesRejected().out_of_range, 2);
+  EXPECT_EQ(link.samplesRejected().of_another, 3);
+  EXPECT_EQ(link.samplesRejected().old, 4);
+}
+
+TEST_F(PrivateBus, WhoWaitsForNothingWaitsAsLongAsTold) {
+  Bus bus(kDefaultUrl);
+  bus.subscribe({channel::kTiming}, [](const std::string&, const void*, std::uint32_t) {});
+  const std::int64_t start = monotonicNow();
+  EXPECT_FALSE(bus.wait(30));
+  EXPECT_GE(monotonicNow() - start, 30'000'000);
+}
+
 TEST_F(PrivateBus, AMachinesClockIsKnownFromWhatGoesToAndFro) {
   Bus machine(kDefaultUrl), controller(kDefaultUrl);
   const Identity self{9, 9};
