@@ -18,9 +18,13 @@ void printJoints(const UrdfRobot& robot, const JointVector& q) {
         std::isfinite(link.lower) || std::isfinite(link.upper)
             ? fmt::format("{:.6g} to {:.6g}", link.lower / unit, link.upper / unit)
             : "no limits";
-    fmt::print("  {:>2}  {:<32} {:<24} {:<4} at {:.6g}\n", i + 1,
+    const std::string rate =
+        std::isfinite(robot.fastest(i))
+            ? fmt::format(", up to {:.4g} {}/s", robot.fastest(i) / unit, jointUnitName(link.type))
+            : "";
+    fmt::print("  {:>2}  {:<32} {:<24} {:<4} at {:.6g}{}\n", i + 1,
                robot.joint_names[static_cast<std::size_t>(i)], range, jointUnitName(link.type),
-               q(i) / unit);
+               q(i) / unit, rate);
   }
   for (const NamedFrame& frame : robot.frames) {
     if (frame.joint.empty()) continue;

@@ -116,7 +116,7 @@ int sweepCommand(int argc, char** argv) {
     if (until > 0.0 && ranks > 1)
       throw InputError("--until: looks at rows one after the other, want one process");
     if (until > 0.0 && design != SweepDesign::kUniform)
-      throw InputError("--until: fewer runs are no such design, want --design uniform");
+      throw InputError("--until: a design has all of its runs, want --design uniform");
     if (!draw.empty())
       plan.drawWhole([asked = askedOf(options.scenario, sets)](const std::string& key) {
         return takesOnlyWhole(asked, key);
@@ -158,7 +158,9 @@ int sweepCommand(int argc, char** argv) {
           design == SweepDesign::kUniform || result.levels ? "" : ", or closer by its design";
       fmt::print("{}: {:.4g}, {:.4g} to {:.4g} with 95 % confidence{}, of {} runs{}{}\n", figure,
                  f.value, f.low, f.high, none, f.of,
-                 result.levels ? fmt::format(" in {} levels", result.levels) : "",
+                 result.levels
+                     ? fmt::format(" in {} level{}", result.levels, result.levels > 1 ? "s" : "")
+                     : "",
                  f.without ? fmt::format("; {} have none", f.without) : "");
       if (until > 0.0 && !(f.half() <= until))
         fmt::print("not within {:g}: want more --runs\n", until);

@@ -330,7 +330,7 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"joint_too_fast", "puma_tilt",
             "program=[{calibration: {}, robot: [{at_s: 0, joint: joint_1, to_deg_or_m: 90, "
             "duration_s: 1}]}]",
-            "joint 'joint_1' would move at up to 168.8 deg/s, want at most 110: 1.53 s or more"},
+            "joint 'joint_1' would move at up to 168.8 deg/s, want at most 110: 1.534 s or more"},
         Bad{"key_of_a_file", "puma_tilt", "robot.colour=red",
             "unknown key, known here: adapter, adapter_position_m, encoders, gripper_switch, "
             "joints, joints_deg_or_m, lock, mount_m, mount_rpy_deg, tip, urdf"},

@@ -360,6 +360,16 @@ TEST_F(Sweep, GoesOnInASubsetSimulationWhereItWasKilled) {
   EXPECT_NE(again.text.find(one.text.substr(at)), std::string::npos) << again.text;
 }
 
+TEST_F(Sweep, OfOneLevelASubsetSimulationIsAShareAsAnyOther) {
+  const test::Output all = sweep(
+      "free_decay --set 'program=[{move: {to: {x_m: 0.001}}}]' --draw plant_mismatch.tau=0.9:1 "
+      "--runs 100 --design subset --figure 'plant_mismatch.tau>0.5'" +
+      out("a"));
+  EXPECT_NE(all.text.find(": 1, 0.963 to 1 with 95 % confidence, of 100 runs in 1 level\n"),
+            std::string::npos)
+      << all.text;
+}
+
 TEST_F(Sweep, KnowsNothingOfAFigureThatFewRunsHave) {
   // A column that is empty in every row: nothing is known, however many rows there are.
   const test::Output o = sweep(
@@ -442,9 +452,19 @@ TEST_F(Sweep, RefusesByName) {
   refused("z_sine --vary seed=1,2 --design best" + out("s"), "--design");
   refused("z_sine --draw plant_mismatch.tau=0.9:1 --runs 4 --design latin --figure seed --until 1" +
               out("s"),
-          "--until: fewer runs are no such design");
+          "--until: a design has all of its runs");
   const std::string drawn = "z_sine --draw plant_mismatch.tau=0.9:1 --design subset ";
-  refused(drawn + "--runs 100 --figure seed" + out("s"), "--design subset: want one process, and");
+  refused(drawn + "--runs 100 --figure seed" + out("s"), "--design subset: want --figure");
+  refused(drawn + "--runs 100 --figure 'ended>1'" + out("n"), "'ended' has words, want a column");
+  refused(drawn + "--runs 100 --figure 'contacts>1'" + out("n2"),
+          "'contacts>': no run has a number");
+  const std::string two =
+      "free_decay --set 'program=[{move: {to: {x_m: 0.001}}}]' --draw plant_mismatch.tau=0.9:1 "
+      "--draw plant_mismatch.gain_extend=0.9:1 --runs 100 --design subset --figure ";
+  ASSERT_EQ(sweep(two + "'plant_mismatch.tau>0.95'" + out("u")).status, 0);
+  ASSERT_EQ(sweep(two + "'plant_mismatch.tau>0.97'" + out("u")).status, 0);
+  refused(two + "'plant_mismatch.gain_extend>0.95'" + out("u"), "another sweep was begun here");
+  refused(two + "'plant_mismatch.tau<0.95'" + out("u"), "another sweep was begun here");
   refused(drawn + "--runs 90 --figure 'seed>1'" + out("s"), "--runs 90 a level, want a multiple");
   refused(drawn + "--runs 100 --vary seed=1,2 --figure 'seed>1'" + out("s"), "want no --vary");
   refused("z_sine --vary legs.K_Q=1,2" + out("s"), "legs.K_Q: unknown key");

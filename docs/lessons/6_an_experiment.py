@@ -48,9 +48,9 @@ def beside_truth(settings):
     return t, run.pose("actual")[admittance], free
 
 program = ("[{move: {}}, {calibration: {}}, {move: {}}, {admittance: {duration_s: 14}, robot: ["
-           "{at_s: 5, duration_s: 1, joint: joint_2, to_deg_or_m: -30}, "
+           "{at_s: 5, duration_s: 1.05, joint: joint_2, to_deg_or_m: -30}, "
            "{at_s: 8, duration_s: 1.2, joint: joint_1, to_deg_or_m: 60}, "
-           "{at_s: 11, duration_s: 1, joint: joint_2, to_deg_or_m: -90}]}]")
+           "{at_s: 11, duration_s: 1.05, joint: joint_2, to_deg_or_m: -90}]}]")
 compensation = {f"controller.compensation.{part}": True for part in ("feed_forward", "observer", "inertia")}
 figure, axes = plt.subplots(1, 2, figsize=(10, 4), sharey=True)
 error = {}

@@ -33,9 +33,9 @@ std::string whyTooFast(const UrdfRobot& robot, const RobotMove& move, const Join
   if (peak <= most * (1.0 + 1e-9)) return "";
   const JointType type = robot.model.jointLink(j).type;
   return fmt::format(
-      "joint '{}' would move at up to {:.4g} {}/s, want at most {:.4g}: {} s or more",
+      "joint '{}' would move at up to {:.4g} {}/s, want at most {:.4g}: {:.6g} s or more",
       robot.joint_names[static_cast<std::size_t>(j)], peak / jointUnit(type), jointUnitName(type),
-      most / jointUnit(type), fmt::format("{:.3g}", move.duration * peak / most));
+      most / jointUnit(type), std::ceil(1e3 * move.duration * peak / most) * 1e-3);
 }
 
 /// [-] of the robot's frames: the tip, or the only frame that carries no other; -1: none.

@@ -145,8 +145,9 @@ std::string Section::choice(std::string_view key, const std::vector<std::string_
 
 std::string Section::chosen(std::string_view key, const std::vector<std::string_view>& allowed) {
   const Value& value = need(key);
-  if (value.kind != Value::Kind::kScalar ||
-      std::find(allowed.begin(), allowed.end(), value.text) == allowed.end())
+  if (value.kind != Value::Kind::kScalar)
+    fail(key, fmt::format("is {}, want one of {}", kindName(value), fmt::join(allowed, ", ")));
+  if (std::find(allowed.begin(), allowed.end(), value.text) == allowed.end())
     fail(key, fmt::format("'{}', want one of {}", value.text, fmt::join(allowed, ", ")));
   return value.text;
 }

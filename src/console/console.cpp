@@ -220,6 +220,7 @@ class Console {
           if (!text) return;
           if (text->empty()) continue;
         }
+        if (!terminal_ && text->back() == '&') text->pop_back();  // here nothing waits anyway
         const Command command = parseCommand(*text, experiment_);
         if (!obey(command)) return;
         // What comes through a pipe does not see when it is armed.
@@ -232,6 +233,11 @@ class Console {
   }
 
   // --- What is done about it ---------------------------------------------------------------------
+
+  void pass(double seconds) {
+    const std::int64_t until = monotonicNow() + static_cast<std::int64_t>(seconds * 1e9);
+    while (monotonicNow() < until && !over()) session_->listen(kTurn);
+  }
 
   /// False for the end.
   bool obey(const Command& command) {
@@ -246,11 +252,7 @@ class Console {
         if (collector_) say(collector_->outcome());
         collector_.emplace(experiment_, command.collection);
         break;
-      case Verb::kWait: {
-        const std::int64_t until = monotonicNow() + static_cast<std::int64_t>(command.wait * 1e9);
-        while (monotonicNow() < until && !over()) session_->listen(kTurn);
-        break;
-      }
+      case Verb::kWait: pass(command.wait); break;
       case Verb::kRobot:
       case Verb::kTool:
       case Verb::kGrasp:
@@ -266,11 +268,11 @@ class Console {
   void askRobot(const RobotOrder& order) {
     const std::int64_t before = session_->robotOrders().answered();
     session_->orderRobot(order);
+    if (terminal_) return;
     const std::int64_t patience = monotonicNow() + kPatience;
     const auto answered = [&] { return session_->robotOrders().answered() != before; };
-    while (!terminal_ && !answered() && !over() && monotonicNow() < patience)
-      session_->listen(kTurn);
-    if (terminal_ || answered() || over()) return;
+    while (!answered() && !over() && monotonicNow() < patience) session_->listen(kTurn);
+    if (answered() || over()) return;
     say("the robot does not answer");
     failed_ = true;
   }
@@ -321,6 +323,7 @@ class Console {
     }
   }
 
+  /// Whether the platform moves until it is over.
   static bool moves(Verb verb) {
     switch (verb) {
       case Verb::kArm:
@@ -332,6 +335,18 @@ class Console {
       case Verb::kHold:
       case Verb::kStop: return true;
       default: return false;
+    }
+  }
+
+  /// [s] that something else lasts.
+  static double lasts(const Command& command) {
+    switch (command.verb) {
+      case Verb::kRobot: return std::get<RobotMove>(command.robot).duration;
+      case Verb::kTool: return std::get<ToolOrder>(command.robot).duration;
+      case Verb::kPush: return std::get<PushOrder>(command.robot).duration;
+      case Verb::kThrust: return command.order.thrust.maxCoeff();
+      case Verb::kVehicle: return command.order.vehicle.over;
+      default: return 0.0;
     }
   }
 
@@ -359,20 +374,21 @@ class Console {
 
   /// One after the other; each waits until what it started is over, unless it ends in `&`.
   void obeyScript() {
-    for (std::size_t i = 0; i < script_.size() && !over() && !failed_; ++i) {
+    bool arms = false;
+    std::size_t i = 0;
+    while (i < script_.size() && !over() && !failed_ && phase_ != Phase::kParked) {
       const auto& [command, waits] = script_[i];
-      say("> " + options_.commands[i]);
-      if (!obey(command)) return;
-      if ((waits && moves(command.verb)) || i + 1 == script_.size())
-        settle(command.verb == Verb::kArm);
+      say("> " + options_.commands[i++]);
+      if (!obey(command)) break;
+      arms = arms || command.verb == Verb::kArm;
+      if (waits && !failed_) pass(lasts(command));
+      if ((waits && moves(command.verb)) || i == script_.size()) settle(arms);
       if (phase_ == Phase::kStopped) failed_ = true;
-      if (phase_ == Phase::kParked) {  // a stop: the controller lets go, and ends
-        for (++i; i < script_.size(); ++i)
-          say("the run is over; left out: " + options_.commands[i]);
-        return;
-      }
     }
-    while (collector_ && !over()) session_->listen(kTurn);
+    // After a stop the controller lets go, and ends.
+    if (i < script_.size() && options_.stop()) failed_ = true;
+    for (; i < script_.size(); ++i) say("left out: " + options_.commands[i]);
+    while (collector_ && !over() && phase_ != Phase::kParked) session_->listen(kTurn);
   }
 
   void collect(const std::string& channel, const void* data, std::uint32_t size) {

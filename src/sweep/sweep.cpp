@@ -66,6 +66,8 @@ constexpr const char* kNumbers[] = {"simulated_s",
                                     "contact_restitution_free_space",
                                     "contact_energy_error"};
 
+constexpr std::string_view kWords[] = {"ended", "first_cause"};  // columns of words
+
 /// The cells of a line of CSV.
 std::vector<std::string> cells(const std::string& line) {
   std::vector<std::string> out(1);
@@ -84,7 +86,7 @@ std::vector<std::string> cells(const std::string& line) {
 std::string headerOf(const SweepPlan& plan) {
   std::string line = "run";
   for (const std::string& key : plan.keys()) line += fmt::format(",{}", csvField(key));
-  line += ",ended,first_cause,first_cause_tick";
+  line += fmt::format(",{},first_cause_tick", fmt::join(kWords, ","));
   for (const char* number : kNumbers) line += fmt::format(",{}", number);
   return line;
 }
@@ -119,13 +121,15 @@ std::string rowOf(const SweepPlan& plan, const Value& scenario, std::int64_t run
 }
 
 /// Refuses a folder in which another sweep was begun; else leaves there what this one is.
-void requireSame(const SweepPlan& plan, const SweepOptions& options) {
+void requireSame(const SweepPlan& plan, const SweepOptions& options, bool simulates_subsets) {
   std::vector<std::string> all = options.overrides;
   for (const std::string& one : plan.overrides(0)) all.push_back(one);
+  const std::string asked =
+      options.figure ? fmt::format("towards {}\n", options.figure->question()) : std::string();
   const std::string text =
-      plan.text() + fmt::format("set {}\nconfiguration of run 0: {}\n",
-                                fmt::join(options.overrides, " "),
-                                loadExperiment(options.scenario, all).source.hash);
+      plan.text() + (simulates_subsets ? asked : "") +
+      fmt::format("set {}\nconfiguration of run 0: {}\n", fmt::join(options.overrides, " "),
+                  loadExperiment(options.scenario, all).source.hash);
   const fs::path file = options.file.string() + ".plan";
   if (std::ifstream in(file, std::ios::binary); in) {
     const std::string there((std::istreambuf_iterator<char>(in)), {});
@@ -290,6 +294,9 @@ void simulateSubsets(SubsetSimulation& subset, const Figure& figure, Runner& run
       if (row == rows.end()) return;
       beyond.push_back(figure.beyond(cells(row->second)));
     }
+    if (std::all_of(beyond.begin(), beyond.end(), [](double x) { return std::isnan(x); }) &&
+        batch.first == 0)
+      throw InputError(fmt::format("--figure '{}': no run has a number there", figure.question()));
     try {
       subset.take(beyond);
     } catch (const std::domain_error& error) {
@@ -304,8 +311,13 @@ SweepResult sweep(SweepPlan& plan, const SweepOptions& options,
                   const std::function<void(const SweepProgress&)>& shown,
                   const std::function<bool()>& stop) {
   SubsetSimulation* const subset = plan.subset();
-  if (subset && (options.ranks > 1 || !options.figure || !options.figure->counts()))
-    throw InputError("--design subset: want one process, and --figure 'COLUMN>LIMIT'");
+  for (const std::string_view words : kWords)
+    if (options.figure && options.figure->column() == words)
+      throw InputError(fmt::format("--figure: '{}' has words, want a column of numbers", words));
+  if (subset && (!options.figure || !options.figure->counts()))
+    throw InputError("--design subset: want --figure 'COLUMN>LIMIT', or <");
+  if (subset && options.ranks > 1)
+    throw InputError("--design subset: one level after the other, want one process");
   const std::int64_t runs = plan.size();
   const std::string header = headerOf(plan);
   FigureWatch watch(options, header);
@@ -315,7 +327,7 @@ SweepResult sweep(SweepPlan& plan, const SweepOptions& options,
   if (lock < 0) throw InputError(fmt::format("{}: {}", part.string(), std::strerror(errno)));
   if (flock(lock, LOCK_EX | LOCK_NB) != 0)
     throw InputError(fmt::format("{}: another sweep is writing here", part.string()));
-  requireSame(plan, options);
+  requireSame(plan, options, subset != nullptr);
   std::map<std::int64_t, std::string> rows = readRows(part, header, runs);
   writeRows(part, header, rows);
   Runner runner(plan, options, part, rows, shown, stop);
@@ -354,12 +366,12 @@ SweepResult sweep(SweepPlan& plan, const SweepOptions& options,
   result.complete = subset ? subset->next().size == 0 : enough || result.rows == runs;
   if (options.ranks > 1 && result.complete) watch.enough(rows);
   result.figure = watch.estimate();
-  if (subset) {
+  if (subset) result.levels = subset->estimate().levels;
+  if (result.levels > 1) {  // of one level it is a share as any other
     const SubsetSimulation::Estimate& e = subset->estimate();
     result.figure->value = e.probability;
     result.figure->low = e.low;
     result.figure->high = e.high;
-    result.levels = e.levels;
   }
   for (const auto& [run, row] : rows) result.not_good += !good(row);
   close(lock);

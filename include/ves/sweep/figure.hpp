@@ -23,6 +23,9 @@ class Figure {
   /// "COLUMN", "COLUMN>LIMIT" or "COLUMN<LIMIT". Throws InputError.
   explicit Figure(const std::string& text);
 
+  const std::string& column() const { return column_; }
+  /// Without the limit, "COLUMN>": what the runs of a subset simulation hang on.
+  std::string question() const { return column_ + (beyond_ ? std::string(1, beyond_) : ""); }
   /// Where the column is. Throws InputError where there is none.
   void find(const std::vector<std::string>& header);
   /// How often it is beyond a limit, and no mean.
