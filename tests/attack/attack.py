@@ -56,6 +56,11 @@ def enter_private_network():
         fcntl.ioctl(s, 0x890B, route)
 
 
+def signal_to(process, number):
+    """Not by Popen: that asks how it has ended, and Run would wait for nobody."""
+    os.kill(process.pid, number)
+
+
 class Run:
     """One command: how it ended, what it said, what it cost."""
 
@@ -67,7 +72,7 @@ class Run:
             process = subprocess.Popen([str(VES), *arguments], cwd=folder, stdin=subprocess.DEVNULL,
                                        stdout=stdout if stdout != subprocess.PIPE else subprocess.DEVNULL,
                                        stderr=err, preexec_fn=prepare, start_new_session=True)
-            killer = threading.Timer(patience, process.kill)
+            killer = threading.Timer(patience, signal_to, (process, signal.SIGKILL))
             killer.start()
             if sent:
                 sent(process)
@@ -226,7 +231,7 @@ def attack_signals(rng, folder):
 
     def send(process):
         time.sleep(after)
-        process.send_signal(number)
+        signal_to(process, number)
     run = Run(["run", "z_sine", "--no-plots", *ON_TIME, *FRESH, "--set",
                "program=[{trajectory: {duration_s: 2, z: {sine: {amplitude_m: 0.1, frequency_hz: 0.5}}}}]",
                "--out", "out"], folder, sent=send)
@@ -245,7 +250,7 @@ def attack_kills(rng, folder):
         time.sleep(after)
         seen = log.stat().st_size if log.exists() else 0
         time.sleep(1.0)
-        process.kill()
+        signal_to(process, signal.SIGKILL)
     Run(["run", "z_sine", "--no-plots", *ON_TIME, "--set",
          "program=[{trajectory: {duration_s: 9, z: {sine: {amplitude_m: 0.1, frequency_hz: 0.5}}}}]",
          "--out", "out"], folder, sent=kill)
