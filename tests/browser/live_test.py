@@ -24,6 +24,7 @@ FREE = [word for key in ("controller.compensation.feed_forward=true", "controlle
                          "program=[{move: {}}, {calibration: {}}, {admittance: {duration_s: 9}}]")
         for word in ("--set", key)]
 
+LONG = FREE[:-1] + ["program=[{move: {}}, {calibration: {}}, {admittance: {duration_s: 60}}]"]
 SWINGING = FREE[:-1] + ["program=[{move: {}}, {calibration: {}}, {admittance: {duration_s: 60}, robot: ["
                         + ", ".join(f"{{at_s: {1 + 4 * k}, duration_s: 1.5, joint: joint_2, to_deg_or_m: {-60 if k % 2 == 0 else -90}}}"
                                     for k in range(9)) + "]}]"]
@@ -72,14 +73,15 @@ class Live(support.Page):
         ActionChains(self.browser).release().key_up(Keys.SHIFT).perform()
 
     def test_a_push_moves_it_as_it_would_the_base(self):
-        run = support.Run(self.out / "push", *FREE)
+        run = support.Run(self.out / "push", *LONG)  # however long the mouse takes
         self.open(run)
         Select(self.browser.find_element("id", "pushed")).select_by_value("platform")
         self.until("ves.words.includes('admittance') && ves.time() > 3.5")
         floor = self.ask("ves.seen('')")
         self.drag("platform", 80, 0)  # 0.25 N a pixel
         self.assertEqual(self.ask("ves.seen('')"), floor)  # nobody has turned the camera
-        self.until("ves.live.closed")
+        self.until(f"ves.time() > {self.ask('ves.time()') + 3}")
+        self.browser.find_element("id", "stop").click()
         self.assertEqual(run.wait(), 0, run.said)
         rows = list(support.rows(run.out, "tick").values())
         force = np.array([[float(r[f"push_f{c}_n"]) for c in "xyz"] for r in rows])
