@@ -187,11 +187,16 @@ TEST_F(Files, ArePathsWhateverTheirNames) {
   for (const char* name : {"a: b.urdf", "[r].URDF", "r.xml", "cell: #1/r"})
     EXPECT_EQ(loadRobot(put(name, kBrick), {}).robot.model.base.mass, 20.0) << name;
   EXPECT_EQ(loadRobot(put("robot", "urdf: r.xml\n"), {}).robot.model.base.mass, 20.0);
-  EXPECT_NE(test::refusal([&] { loadRobot(put("robot", "urdf: r.xml\ncolour: red\n"), {}); })
-                .find("robot:2: robot.colour: unknown key"),
+  EXPECT_NE(test::refusal([&] {
+              loadRobot(put("robot", "urdf: r.xml\ncolour: red\n"), {});
+            }).find("robot:2: robot.colour: unknown key"),
             std::string::npos);
-  EXPECT_NE(test::refusal([&] { loadRobot("nowhere.urdf", {}); }).find("nowhere.urdf: no such file"),
-            std::string::npos);
+  const std::string puma = test::configDir() + "/robots/puma560.urdf";
+  for (const char* set : {"joints=[joint_1]", "robot.joints=[joint_1]"})
+    EXPECT_EQ(loadRobot(puma, {set}).robot.model.joints, 1) << set;
+  EXPECT_NE(
+      test::refusal([&] { loadRobot("nowhere.urdf", {}); }).find("nowhere.urdf: no such file"),
+      std::string::npos);
   const fs::path scenario = put("s.yml", "name: s\n");
   EXPECT_EQ(findFile("scenario", scenario.string(), folder_), scenario);
 }

@@ -29,7 +29,12 @@ class ProgramReader {
         continue;
       }
       Segment& segment = next(root);  // which its events belong to
-      readSegment(item.section(kind), kind, segment);
+      const Section inside = item.section(kind);
+      for (const std::string_view beside : {"robot", "faults"})
+        if (const auto& keys = inside.keys();
+            std::find(keys.begin(), keys.end(), beside) != keys.end())
+          inside.fail(beside, fmt::format("stands beside {}, not in it", kind));
+      readSegment(inside, kind, segment);
       if (item.has("robot")) readRobotEvents(item);
       if (item.has("faults"))
         for (Section event : item.list("faults")) readFault(event);

@@ -202,7 +202,8 @@ LoadedRobot loadRobot(const std::string& file, const std::vector<std::string>& o
   if (!std::filesystem::exists(file)) throw InputError(file + ": no such file");
   Value document = parseDocument("{}", file);
   applyOverride(document, fmt::format("robot.{}={}", looksLikeXml(file) ? "urdf" : "from", file));
-  for (const std::string& one : overrides) applyOverride(document, "robot." + one);
+  for (const std::string& one : overrides)  // as in a scenario, too
+    applyOverride(document, one.starts_with("robot.") ? one : "robot." + one);
   const Value& value = *document.find("robot");
   Section s(value, "robot");
   const Value* text = value.find("urdf_text");
