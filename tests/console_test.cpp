@@ -315,6 +315,13 @@ TEST_F(Console, AScriptDoesNotWaitForWhatEndsInAnAmpersand) {
   EXPECT_EQ(last.text.find("ended early"), std::string::npos) << last.text;
 }
 
+TEST_F(Console, AQuitWaitsForNoCollection) {
+  const Output o = sh(session("--do 'collect c.csv 20' --do quit --do status --out a"));
+  EXPECT_EQ(o.status, 0) << o.text;
+  EXPECT_NE(o.text.find("left out: status"), std::string::npos) << o.text;
+  EXPECT_LT(summary(folder_ / "a")["simulated_s"].get<double>(), 15.0);  // 20 s are not collected
+}
+
 TEST_F(Console, BadInputIsSaidBeforeAnythingStarts) {
   for (const char* bad : {"--do 'trajectory 3 z sine 400 1'", "--do fly", "--do arm --start",
                           "--calibration none.yaml --do arm"}) {

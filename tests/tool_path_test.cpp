@@ -442,6 +442,8 @@ TEST(RobotOrders, APathIsPlannedBesideTheMachineFromWhereTheRobotIs) {
   plant::Truth moves = truth;  // one that has to turn round first goes faster after it
   moves.joints.q_dot(0) = -0.9 * most;
   EXPECT_THROW(orders.take(lasting(least * 1.0001), moves), InputError);
+  moves.joints.q_dot(0) = NAN;  // which is no speed below the limit
+  EXPECT_THROW(orders.take(lasting(least * 1.0001), moves), InputError);
   EXPECT_THROW(orders.take(RobotMove{6, 0.0, 1.0}, truth), InputError);
   // What needs no plan begins at once; a load is in the tool's frame.
   EXPECT_TRUE(orders.take(RobotMove{0, 1.0, 1.0}, truth));

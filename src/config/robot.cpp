@@ -26,11 +26,15 @@ std::string whyTooFast(const UrdfRobot& robot, const RobotMove& move, const Join
                            Eigen::Matrix<double, 1, 1>(from.q_dot(j)),
                            Eigen::Matrix<double, 1, 1>(from.q_ddot(j))};
   const Quintic<1> path(begin, Eigen::Matrix<double, 1, 1>(move.target), move.duration);
-  double peak = 0.0;
-  for (int i = 0; i <= kLooks; ++i)
-    peak = std::max(peak, std::abs(path.at(move.duration * i / kLooks).x_dot(0)));
   const double most = robot.fastest(j);
-  if (peak <= most * (1.0 + 1e-9)) return "";
+  double peak = 0.0;
+  bool keeps = true;
+  for (int i = 0; i <= kLooks; ++i) {
+    const double speed = std::abs(path.at(move.duration * i / kLooks).x_dot(0));
+    keeps = keeps && speed <= most * (1.0 + 1e-9);
+    peak = std::max(peak, speed);
+  }
+  if (keeps) return "";
   const JointType type = robot.model.jointLink(j).type;
   return fmt::format(
       "joint '{}' would move at up to {:.4g} {}/s, want at most {:.4g}: {:.6g} s or more",

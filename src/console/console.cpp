@@ -374,12 +374,13 @@ class Console {
 
   /// One after the other; each waits until what it started is over, unless it ends in `&`.
   void obeyScript() {
-    bool arms = false;
+    bool arms = false, quits = false;
     std::size_t i = 0;
     while (i < script_.size() && !over() && !failed_ && phase_ != Phase::kParked) {
       const auto& [command, waits] = script_[i];
       say("> " + options_.commands[i++]);
-      if (!obey(command)) break;
+      quits = !obey(command);
+      if (quits) break;
       arms = arms || command.verb == Verb::kArm;
       if (waits && !failed_) pass(lasts(command));
       if ((waits && moves(command.verb)) || i == script_.size()) settle(arms);
@@ -388,7 +389,7 @@ class Console {
     // After a stop the controller lets go, and ends.
     if (i < script_.size() && options_.stop()) failed_ = true;
     for (; i < script_.size(); ++i) say("left out: " + options_.commands[i]);
-    while (collector_ && !over() && phase_ != Phase::kParked) session_->listen(kTurn);
+    while (collector_ && !quits && !over() && phase_ != Phase::kParked) session_->listen(kTurn);
   }
 
   void collect(const std::string& channel, const void* data, std::uint32_t size) {

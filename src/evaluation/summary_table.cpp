@@ -32,7 +32,7 @@ std::string table(const nlohmann::ordered_json& s) {
   std::string cause = s["first_cause"].get<std::string>();
   if (const std::string why = s.value("first_cause_evidence", ""); !why.empty())
     cause += fmt::format(" ({})", why);
-  if (s["ended"] == name(Phase::kDisarmed) && s["arming_was_asked"].get<bool>())
+  if (s["ended"] == name(Phase::kDisarmed) && s.value("arming_was_asked", true))
     out += fmt::format("  never armed: {}\n", s["first_cause"] == name(Check::kCount)
                                                   ? "no stream of new samples long enough"
                                                   : cause);

@@ -11,12 +11,6 @@
 #include "ves/core/errors.hpp"
 
 namespace ves {
-namespace {
-
-constexpr double kDeviations = 1.959963984540054;  // [-] that 95 % are within
-
-}  // namespace
-
 Figure::Figure(const std::string& text) : text_(text), column_(text) {
   const std::size_t at = text.find_first_of("<>");
   if (at != std::string::npos) {

@@ -7,6 +7,8 @@
 
 namespace ves {
 
+inline constexpr double kDeviations = 1.959963984540054;  // [-] that 95 % are within
+
 /// False where a text is no finite number, and nothing else.
 inline bool toNumber(const std::string& text, double& x) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), x);

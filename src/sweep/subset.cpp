@@ -6,16 +6,14 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "number.hpp"
 #include "random.hpp"
 
 namespace ves {
 namespace {
 
 /// Back into [0, 1], as from mirrors at its ends.
-double mirrored(double x) {
-  x = std::fabs(std::remainder(x, 2.0));
-  return x;
-}
+double mirrored(double x) { return std::fabs(std::remainder(x, 2.0)); }
 
 }  // namespace
 
@@ -81,7 +79,6 @@ double SubsetSimulation::correlation(double threshold, double share) const {
 }
 
 void SubsetSimulation::finishLevel() {
-  constexpr double kDeviations = 1.959963984540054;  // [-] that 95 % are within
   std::vector<std::size_t> order(level_.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(), [this](std::size_t a, std::size_t b) {
