@@ -123,11 +123,13 @@ int sweepCommand(int argc, char** argv) {
       });
     // What is wrong with the first and the last is told before hours have passed.
     for (const std::int64_t run : {std::int64_t{0}, plan.subset() ? 0 : plan.size() - 1}) {
-      std::vector<std::string> all = sets;
-      for (const std::string& one : plan.overrides(run)) all.push_back(one);
-      const Experiment e = loadExperiment(options.scenario, all);
+      Value document = loadDocument(options.scenario);
+      for (const std::string& set : sets) applyOverride(document, set);
+      plan.put(plan.overrides(run), document);
+      const Experiment e = buildExperiment(std::move(document), {});
       if (out.empty()) out = "ves-runs/sweep-" + e.name;
     }
+    requireFigure(plan, options);
     options.file = makeFolder(out) / "sweep.csv";
     catchSignals();
     const bool terminal = isatty(STDERR_FILENO) != 0;

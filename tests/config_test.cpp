@@ -436,6 +436,15 @@ INSTANTIATE_TEST_SUITE_P(
             "base.free.thrusters=[{at_m: [0, 0, 0], force_n: [0, 1, 0], least_on_s: 0.5, "
             "firings_s: [[1, 1.1]]}]",
             "[1, 1.1] is shorter than least_on_s of 0.5"},
+        Bad{"firing_after_the_end", "satellite_hold",
+            "base.free.thrusters=[{at_m: [0, 0, 0], force_n: [0, 1, 0], firings_s: [[1, 2], [100, "
+            "101]]}]",
+            "base.free.thrusters: number 0, firings_s: begins at 100 s, when admittance control "
+            "has "
+            "ended after 14 s"},
+        Bad{"wheel_after_the_end", "satellite_hold",
+            "base.free.wheels=[{axis: [0, 0, 1], most_nms: 1, torques_s_nm: [[14, 15, 1]]}]",
+            "base.free.wheels: number 0, torques_s_nm: begins at 14 s"},
         Bad{"wheel_without_axis", "satellite_hold",
             "base.free.wheels=[{axis: [0, 0, 0], most_nms: 1, torques_s_nm: [[1, 2, 1]]}]",
             "base.free.wheels[0].axis: no direction"},

@@ -280,6 +280,8 @@ TEST_F(Console, AScriptStopsAtWhatIsRefused) {
   EXPECT_NE(o.text.find("not taken: the legs are not armed"), std::string::npos) << o.text;
   EXPECT_EQ(o.text.find("> move x 10"), std::string::npos) << o.text;
   EXPECT_NE(o.text.find("left out: move x 10"), std::string::npos) << o.text;
+  EXPECT_EQ(sh(session("--do 'admittance 1' --out b") + " 2>&1 >/dev/null").text,
+            "not taken: the legs are not armed; arm first\n");
 }
 
 TEST_F(Console, AScriptKnowsWhetherTheRobotObeys) {

@@ -447,6 +447,7 @@ TEST_F(Sweep, RefusesByName) {
   refused("z_sine" + out("s"), "one run only");
   refused("z_sine --vary seed=1,2 --until 0.1" + out("s"), "--until requires --figure");
   refused("z_sine --vary seed=1,2 --figure nothing" + out("s"), "--figure 'nothing': no such");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "s"));  // what is refused leaves nothing
   refused("z_sine --vary seed=1,2 --figure 'seed>x'" + out("s"), "--figure 'seed>x': want COLUMN");
   refused("z_sine --vary seed=1,2 --design sobol" + out("s"), "--design: places draws");
   refused("z_sine --vary seed=1,2 --design best" + out("s"), "--design");
@@ -467,7 +468,8 @@ TEST_F(Sweep, RefusesByName) {
   refused(two + "'plant_mismatch.tau<0.95'" + out("u"), "another sweep was begun here");
   refused(drawn + "--runs 90 --figure 'seed>1'" + out("s"), "--runs 90 a level, want a multiple");
   refused(drawn + "--runs 100 --vary seed=1,2 --figure 'seed>1'" + out("s"), "want no --vary");
-  refused("z_sine --vary legs.K_Q=1,2" + out("s"), "legs.K_Q: unknown key");
+  refused("z_sine --vary legs.K_Q=1,2" + out("s"), "--vary legs.K_Q=1:1: legs.K_Q: unknown key");
+  refused("z_sine --draw legs.K_Q=1:2 --runs 2" + out("s"), "ves sweep: --draw legs.K_Q=1.");
   refused("z_sine --vary legs.K_P=1,-2" + out("s"), "legs.K_P: '-2'");  // the last one, too
   refused("nothing --vary legs.K_P=1,2" + out("s"), "nothing");
   refused("z_sine --vary legs.K_P=1,2 --workers 0" + out("s"), "--workers");

@@ -350,10 +350,11 @@ static Value scalar(const std::string& text, const std::string& name) {
   return out;
 }
 
-void applyOverride(Value& document, const std::string& assignment) {
+void applyOverride(Value& document, const std::string& assignment, std::string_view option) {
+  const std::string name = fmt::format("{} {}", option, assignment);
   const std::size_t equals = assignment.find('=');
   if (equals == std::string::npos || equals == 0)
-    throw InputError(fmt::format("--set {}: want key.path=value", assignment));
+    throw InputError(fmt::format("{}: want key.path=value", name));
   std::string path = assignment.substr(0, equals);
   std::erase(path, ']');  // an entry of a list is key[2] or key.2
   std::replace(path.begin(), path.end(), '[', '.');
@@ -363,16 +364,15 @@ void applyOverride(Value& document, const std::string& assignment) {
     keys.push_back(path.substr(begin, dot - begin));
   }
   const std::string given = assignment.substr(equals + 1);
-  Value leaf = isFileOf(keys.back(), given) ? scalar(given, "--set " + assignment)
-                                            : parse(given, "--set " + assignment);
+  Value leaf = isFileOf(keys.back(), given) ? scalar(given, name) : parse(given, name);
   leaf.whole = true;
   Value* at = &document;
   const auto entry = [&](const std::string& key) -> Value& {
     std::size_t index = 0;
     const auto [end, error] = std::from_chars(key.data(), key.data() + key.size(), index);
     if (error != std::errc() || end != key.data() + key.size() || index >= at->children.size())
-      throw InputError(fmt::format("--set {}: '{}', want the number of an entry, 0 to {}",
-                                   assignment, key, std::ssize(at->children) - 1));
+      throw InputError(fmt::format("{}: '{}', want the number of an entry, 0 to {}", name, key,
+                                   std::ssize(at->children) - 1));
     return at->children[index];
   };
   Value map;
@@ -428,6 +428,11 @@ std::filesystem::path findFile(const std::string& kind, const std::string& name,
   std::error_code error;
   if (!name.empty() && std::filesystem::exists(named, error)) return named;
   const std::vector<std::string> names = namesIn(folder);
+  if (names.empty())
+    throw InputError(
+        fmt::format("{} '{}': there is no configuration in {}; want its folder in "
+                    "VES_CONFIG_DIR, or a path to a .yaml file",
+                    kind, name, folder.string()));
   const std::string meant = nearest(name, names);
   if (!meant.empty())
     throw InputError(fmt::format("{} '{}': unknown, did you mean '{}'?", kind, name, meant));

@@ -287,6 +287,7 @@ Experiment build(const Value& document, AskedKey* asked = nullptr) {
   readProgram(root, out);
   requirePathFits(root, c);
   requireGroundFits(root, c);
+  requireFiringsFit(root, c);
   requireFrameFits(root, c, p.task);
   if (const std::string proposal = proposeExcitation(root, c); !proposal.empty())
     out.source.notes.push_back(proposal);

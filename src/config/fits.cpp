@@ -64,6 +64,32 @@ void requireGroundFits(Section& root, const ControllerConfig& c) {
   }
 }
 
+/// What fires after admittance control has ended never fires.
+void requireFiringsFit(Section& root, const ControllerConfig& c) {
+  const auto* free = std::get_if<FreeBodyModel>(&c.vehicle.kind);
+  const double longest = c.longestAdmittance();
+  if (!free || longest == 0.0) return;
+  const auto check = [&](const char* list, int n, const char* key, const Firing& one) {
+    if (one.from < longest) return;
+    root.section("base").section("free").fail(
+        list,
+        fmt::format("number {}, {}: begins at {:.4g} s, when admittance control has ended after "
+                    "{:.4g} s; want an earlier one, or a longer program",
+                    n, key, one.from, longest));
+  };
+  const Propulsion& p = free->propulsion;
+  for (int i = 0; i < p.size; ++i) {
+    const Thruster& thruster = p.thrusters[static_cast<std::size_t>(i)];
+    for (int k = 0; k < thruster.size; ++k)
+      check("thrusters", i, "firings_s", thruster.firings[static_cast<std::size_t>(k)]);
+  }
+  for (int i = 0; i < p.wheel_count; ++i) {
+    const ReactionWheel& wheel = p.wheels[static_cast<std::size_t>(i)];
+    for (int k = 0; k < wheel.size; ++k)
+      check("wheels", i, "torques_s_nm", wheel.torques[static_cast<std::size_t>(k)].on);
+  }
+}
+
 /// Row by row, and from where the segment before it ends, where that is known.
 void requirePathFits(Section& root, const ControllerConfig& c) {
   if (c.path.cols() == 0) return;

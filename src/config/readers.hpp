@@ -97,6 +97,7 @@ MachinePieces readMachine(Section s, std::int64_t controller_period, Resonance& 
 
 /// base.ground, within what the platform may do for as long as the program asks for it
 void requireGroundFits(Section& root, const ControllerConfig& c);
+void requireFiringsFit(Section& root, const ControllerConfig& c);
 /// the recorded path: the steps between its rows, and to its first
 void requirePathFits(Section& root, const ControllerConfig& c);
 /// controller.moving_frame, with what it needs

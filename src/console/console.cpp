@@ -80,6 +80,13 @@ class Console {
     std::fflush(stdout);
   }
 
+  /// What was asked for does not happen: a script, or a pipe, fails by it.
+  void complain(const std::string& text) {
+    if (terminal_) return say(text);
+    std::fputs((text + "\n").c_str(), stderr);
+    failed_ = true;
+  }
+
   void greet() {
     std::string words;
     for (const Item& item : menu())
@@ -154,9 +161,8 @@ class Console {
       calibration_status_ = status;
       if (status == CalibrationStatus::kDone) keepCalibration(s);
       if (status == CalibrationStatus::kRefused) {
-        failed_ = failed_ || !terminal_;
-        say(fmt::format("calibration refused: {}; the bias is as before",
-                        stillnessViolation(s, experiment_)));
+        complain(fmt::format("calibration refused: {}; the bias is as before",
+                             stillnessViolation(s, experiment_)));
       }
     }
   }
@@ -226,8 +232,7 @@ class Console {
         // What comes through a pipe does not see when it is armed.
         if (!terminal_ && command.verb == Verb::kArm) settle(true);
       } catch (const InputError& error) {
-        say(error.what());
-        if (!terminal_) failed_ = true;
+        complain(error.what());
       }
     }
   }
@@ -273,8 +278,7 @@ class Console {
     const auto answered = [&] { return session_->robotOrders().answered() != before; };
     while (!answered() && !over() && monotonicNow() < patience) session_->listen(kTurn);
     if (answered() || over()) return;
-    say("the robot does not answer");
-    failed_ = true;
+    complain("the robot does not answer");
   }
 
   /// A program is run under attendance: it ends holding at home, and the menu goes on.
@@ -283,14 +287,13 @@ class Console {
     arm.request = Request::kArm;
     const auto refusal = session_->order(arm);
     if (refusal && *refusal != Refusal::kNone)
-      say(fmt::format("not taken: {}{}", name(*refusal), advice(*refusal)));
+      complain(fmt::format("not taken: {}{}", name(*refusal), advice(*refusal)));
     const std::int64_t patience = monotonicNow() + kPatience;
     while (refusal == Refusal::kNone && phase_ == Phase::kDisarmed && !over() &&
            monotonicNow() < patience)
       session_->listen(kTurn);
     if (phase_ == Phase::kArmed) return true;
-    say("not armed");
-    failed_ = failed_ || !terminal_;
+    complain("not armed");
     return false;
   }
 
@@ -300,13 +303,11 @@ class Console {
     const bool waits = command.verb != Verb::kVehicle || !terminal_;
     const auto refusal = session_->order(command.order, waits ? -1 : STDIN_FILENO);
     if (!refusal) {
-      say("the controller does not answer");
-      failed_ = true;
+      complain("the controller does not answer");
     } else if (*refusal == Refusal::kChecking) {
       say("still asked of the stability check");
     } else if (*refusal != Refusal::kNone) {
-      say(fmt::format("not taken: {}{}", name(*refusal), advice(*refusal)));
-      failed_ = failed_ || !terminal_;
+      complain(fmt::format("not taken: {}{}", name(*refusal), advice(*refusal)));
     } else if (command.verb == Verb::kTare) {
       say(fmt::format("taking {} samples; then the bias slides over {} s", kCalibrationSamples,
                       experiment_.controller.tare_ramp));
@@ -365,9 +366,7 @@ class Console {
     while (!over() && !settled(arms)) {
       session_->listen(kTurn);
       if (arms && phase_ == Phase::kDisarmed && monotonicNow() > patience) {
-        say("not armed");
-        failed_ = true;
-        return;
+        return complain("not armed");
       }
     }
   }
@@ -398,8 +397,7 @@ class Console {
       if (const auto sample = decode<sample_t>(data, size)) temperature_ = sample->temperature;
       const std::int64_t refused = session_->robotOrders().refused;
       if (refused > std::exchange(refused_, refused)) {
-        say("the robot does not do that; the plant says why");
-        failed_ = failed_ || !terminal_;
+        complain("the robot does not do that; the plant says why");
       }
     } else if (channel == channel::kTiming) {
       timing_ = decode<timing_t>(data, size);
@@ -411,7 +409,7 @@ class Console {
       if (collector_->add(event_)) return;
       say(collector_->outcome());
     } catch (const InputError& error) {
-      say(error.what());
+      complain(error.what());
     }
     collector_.reset();
   }

@@ -183,7 +183,8 @@ void addDrift(const Series& series, nlohmann::ordered_json& out) {
 }
 
 /// What makes an emulation differ from its base, the likeliest first, and what is to be done.
-std::string adviceOf(const ControllerConfig& c) {
+std::string adviceOf(const Experiment& e) {
+  const ControllerConfig& c = e.controller;
   if (c.wrench_filter.any())
     return "the dead band or low-pass of controller.wrench_filter (docs/compensation.md)";
   if (!c.compensation.feed_forward || !c.compensation.observer || !c.compensation.inertia)
@@ -193,6 +194,10 @@ std::string adviceOf(const ControllerConfig& c) {
     return "the sensor's noise (controller.compensation.wrench=aided, docs/compensation.md), or a "
            "mass "
            "that is not as believed (--masses FILE, docs/identification.md)";
+  if (e.plant.task.world)
+    return "the sensor's noise while something is touched or held, which no model takes out "
+           "(docs/vehicles.md), or a mass or a load that is not as believed (--masses FILE, "
+           "docs/identification.md)";
   return "a mass or a load that is not as believed (--masses FILE, docs/identification.md)";
 }
 
@@ -239,7 +244,7 @@ void addEmulation(const Series& series, const std::optional<Emulation>& e,
   const double off = std::max(out.value("emulation_error_position_share", 0.0),
                               out.value("emulation_error_attitude_share", 0.0));
   constexpr double kFarOff = 0.2;  // [-] of the amplitude
-  if (off > kFarOff) out["emulation_advice"] = adviceOf(series.experiment.controller);
+  if (off > kFarOff) out["emulation_advice"] = adviceOf(series.experiment);
   const std::optional<ToolMotion> tool = toolMotion(series, e);
   if (!tool) return;
   const ToolDistance carried = distance(tool->actual, tool->at_rest),

@@ -194,4 +194,9 @@ std::vector<std::string> SweepPlan::overrides(std::int64_t run) const {
   return out;
 }
 
+void SweepPlan::put(const std::vector<std::string>& overrides, Value& scenario) const {
+  for (std::size_t i = 0; i < overrides.size(); ++i)
+    applyOverride(scenario, overrides[i], i < varied_.size() ? "--vary" : "--draw");
+}
+
 }  // namespace ves

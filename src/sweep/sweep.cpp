@@ -94,15 +94,15 @@ std::string headerOf(const SweepPlan& plan) {
 /// One run, as its row.
 std::string rowOf(const SweepPlan& plan, const Value& scenario, std::int64_t run,
                   ReferenceMotions& references) {
-  std::vector<std::string> all;
   std::string row = fmt::format("{}", run);
-  for (const std::string& one : plan.overrides(run)) {
-    all.push_back(one);
+  const std::vector<std::string> values = plan.overrides(run);
+  for (const std::string& one : values)
     row += fmt::format(",{}", csvField(one.substr(one.find('=') + 1)));
-  }
   const std::string rest = std::string(std::size(kNumbers), ',');
   try {
-    Experiment e = buildExperiment(scenario, all);
+    Value document = scenario;
+    plan.put(values, document);
+    Experiment e = buildExperiment(std::move(document), {});
     const std::string diverges =
         wantsAdmittance(e.controller.program) ? applyStabilityCheck(e) : std::string();
     if (e.controller.stability == Stability::kUnstable)
@@ -307,17 +307,23 @@ void simulateSubsets(SubsetSimulation& subset, const Figure& figure, Runner& run
 
 }  // namespace
 
-SweepResult sweep(SweepPlan& plan, const SweepOptions& options,
-                  const std::function<void(const SweepProgress&)>& shown,
-                  const std::function<bool()>& stop) {
-  SubsetSimulation* const subset = plan.subset();
+void requireFigure(const SweepPlan& plan, const SweepOptions& options) {
   for (const std::string_view words : kWords)
     if (options.figure && options.figure->column() == words)
       throw InputError(fmt::format("--figure: '{}' has words, want a column of numbers", words));
-  if (subset && (!options.figure || !options.figure->counts()))
+  if (auto figure = options.figure) figure->find(cells(headerOf(plan)));
+  if (!plan.subset()) return;
+  if (!options.figure || !options.figure->counts())
     throw InputError("--design subset: want --figure 'COLUMN>LIMIT', or <");
-  if (subset && options.ranks > 1)
+  if (options.ranks > 1)
     throw InputError("--design subset: one level after the other, want one process");
+}
+
+SweepResult sweep(SweepPlan& plan, const SweepOptions& options,
+                  const std::function<void(const SweepProgress&)>& shown,
+                  const std::function<bool()>& stop) {
+  requireFigure(plan, options);
+  SubsetSimulation* const subset = plan.subset();
   const std::int64_t runs = plan.size();
   const std::string header = headerOf(plan);
   FigureWatch watch(options, header);

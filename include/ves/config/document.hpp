@@ -53,8 +53,9 @@ std::string_view asWritten(std::string_view key);
 /// Parses text that stands for a file of this name; nothing else is read.
 Value parseDocument(const std::string& text, const std::string& name);
 
-/// Applies "a.b.c=value" as if it stood in the file.
-void applyOverride(Value& document, const std::string& assignment);
+/// Applies "a.b.c=value" as if it stood in the file. Throws InputError, which names the option.
+void applyOverride(Value& document, const std::string& assignment,
+                   std::string_view option = "--set");
 
 /// Of the .yaml files in a folder, without the ending, sorted; none where it cannot be read.
 std::vector<std::string> namesIn(const std::filesystem::path& folder);

@@ -43,8 +43,11 @@ class SweepPlan {
   std::string text() const;
   /// Which runs a subset simulation wants next, and what came of them; null: of another design.
   SubsetSimulation* subset() { return subset_ ? &*subset_ : nullptr; }
+  const SubsetSimulation* subset() const { return subset_ ? &*subset_ : nullptr; }
   /// "KEY=VALUE" of run `run`, keys() in order; of a subset simulation, of its next ones.
   std::vector<std::string> overrides(std::int64_t run) const;
+  /// Applies them. Throws InputError, which names the option of each.
+  void put(const std::vector<std::string>& overrides, Value& scenario) const;
 
  private:
   void take(const std::string& key, const std::string& option) const;
@@ -92,6 +95,10 @@ struct SweepResult {
   std::optional<Figure::Estimate> figure;
   int levels = 0;  // [-] of a subset simulation
 };
+
+/// Before anything is made or run. Throws InputError where the figure is no column of numbers, or
+/// not what the design wants.
+void requireFigure(const SweepPlan& plan, const SweepOptions& options);
 
 /// Runs what is missing. `stop` is looked at before every run; it and `shown` may be called
 /// by any thread, `shown` by one at a time. Throws InputError.
