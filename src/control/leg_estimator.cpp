@@ -12,7 +12,7 @@ LegEstimator::LegEstimator(const ControllerConfig& config)
       limits_(config.safety),
       feels_(config.compensation.inertia),
       adapts_(config.compensation.adaptation),
-      servo_(config.servo, period_),
+      servo_(config.servo, period_, feels_),
       adaptation_(config.servo,
                   {config.compensation.gain_error, config.compensation.timing_error,
                    config.compensation.adaptation_limit, config.compensation.forgetting},

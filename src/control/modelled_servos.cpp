@@ -55,20 +55,24 @@ void ModelledServos::useDelays() noexcept {
     delay_[i] = std::llround(servo_.delay(static_cast<Eigen::Index>(i)) * 1e9);
 }
 
-/// [m] of the newest command that has taken effect.
-double ModelledServos::reference(int leg) const noexcept {
-  const std::int64_t delay = delay_[static_cast<std::size_t>(leg)];
+/// The newest command that has taken effect, of legs with this delay [ns].
+const ModelledServos::Command& ModelledServos::effective(std::int64_t delay) const noexcept {
   const std::size_t known = std::min(sent_, kCommands);
   for (std::size_t i = 1; i < known; ++i) {
     const Command& command = commands_[(sent_ - i) % kCommands];
-    if (command.time + delay <= now_) return command.reference(leg);
+    if (command.time + delay <= now_) return command;
   }
-  return commands_[(sent_ - known) % kCommands].reference(leg);
+  return commands_[(sent_ - known) % kCommands];
 }
 
 /// All LegSlaves compare.
 void ModelledServos::update() noexcept {
-  for (int i = 0; i < kLegs; ++i) E_(i) = reference(i);
+  const Command* command = nullptr;
+  for (std::size_t i = 0; i < kLegs; ++i) {
+    if (i == 0 || delay_[i] != delay_[i - 1]) command = &effective(delay_[i]);
+    const auto leg = static_cast<Eigen::Index>(i);
+    E_(leg) = command->reference(leg);
+  }
   E_ -= reading(L_, v_) + servo_.derivative * v_;
   E_ = E_.cwiseMin(servo_.rail).cwiseMax(-servo_.rail);
   v_end_ = speedsOf(servo_, E_);

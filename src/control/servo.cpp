@@ -26,6 +26,11 @@ double speedOf(const ServoModel& servo, int i, double E) noexcept {
 
 Vec6 speedsOf(const ServoModel& servo, const Vec6& E) noexcept {
   Vec6 v_end;
+  if (servo.opening.isZero(0.0)) {
+    for (int i = 0; i < kLegs; ++i)
+      v_end(i) = E(i) * (E(i) > 0.0 ? servo.extend : servo.retract)(i);
+    return v_end;
+  }
   for (int i = 0; i < kLegs; ++i) v_end(i) = speedOf(servo, i, E(i));
   return v_end;
 }

@@ -5,10 +5,16 @@
 #include <cmath>
 
 namespace ves {
+namespace {
 
-ServoObserver::ServoObserver(const ServoModel& servo, double period, double phase)
-    : servos_(servo, period, phase),
+constexpr double kPhase = 0.5;  // [-] see ModelledServos
+
+}  // namespace
+
+ServoObserver::ServoObserver(const ServoModel& servo, double period, bool feels)
+    : servos_(servo, period, kPhase),
       period_(period),
+      feels_(feels),
       between_(std::llround(period * 1e9) / 16),
       filter_(servo.sensor_cutoff),
       whole_(filter_.prepare(servo.update)) {}
@@ -23,8 +29,9 @@ void ServoObserver::reset(const Vec6& L, std::int64_t time) noexcept {
 void ServoObserver::advance(std::int64_t time) noexcept {
   if (time <= servos_.time()) return;
   const auto passed = [&](const ModelledServos::Passage& passage, const Channels& acceleration) {
-    filter_.jump(acceleration);
-    filter_.advance(passage.dt == whole_.dt ? whole_ : filter_.prepare(passage.dt), acceleration);
+    if (!feels_) return;
+    filter_.advanceHeld(passage.dt == whole_.dt ? whole_ : filter_.prepare(passage.dt),
+                        acceleration);
   };
   const auto updated = [&] {
     if (servos_.time() - past_[(remembered_ - 1) % kInstants].time >= between_) remember();

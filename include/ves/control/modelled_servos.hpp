@@ -70,7 +70,7 @@ class ModelledServos {
     Vec6 reference = Vec6::Zero();     // [m]
   };
   void useDelays() noexcept;
-  double reference(int leg) const noexcept;
+  const Command& effective(std::int64_t delay) const noexcept;
   Channels pass(const Passage& passage) noexcept;
   void update() noexcept;
 
@@ -104,7 +104,7 @@ void ModelledServos::advance(std::int64_t time, const Passed& passed,
     first = false;
     left -= to_update_;
     to_update_ = servo_.update;
-    now_ = time - std::llround(left * 1e9);
+    now_ = time - static_cast<std::int64_t>(left * 1e9 + 0.5);
     update();
     updated();
   }

@@ -17,8 +17,8 @@ namespace ves {
 /// edge, so what the model knows below a count stays.
 class ServoObserver {
  public:
-  /// `phase`: see ModelledServos.
-  ServoObserver(const ServoModel& servo, double period, double phase = 0.5);
+  /// Without `feels` it knows no filtered acceleration.
+  ServoObserver(const ServoModel& servo, double period, bool feels = true);
 
   /// At rest at L, where all commands so far have led.
   void reset(const Vec6& L, std::int64_t time) noexcept;
@@ -66,6 +66,7 @@ class ServoObserver {
 
   ModelledServos servos_;
   double period_;         // [s] of the controller
+  bool feels_;            // runs the sensor's filter
   std::int64_t between_;  // [ns] two instants that are remembered, at least
   Butterworth2<kLegs> filter_;
   Butterworth2<kLegs>::Step whole_;        // of an update

@@ -46,6 +46,14 @@ class Butterworth2 {
   }
   void advance(const Step& step, const Channels& u) noexcept { advance(step, u, Channels::Zero()); }
 
+  /// The input is u from its beginning on.
+  void advanceHeld(const Step& step, const Channels& u) noexcept {
+    const Channels e = y_ - u, e_dot = y_dot_;
+    y_ = u + step.Phi(0, 0) * e + step.Phi(0, 1) * e_dot;
+    y_dot_ = step.Phi(1, 0) * e + step.Phi(1, 1) * e_dot;
+    u_ = u;
+  }
+
   /// The input runs to u along a parabola of the second derivative `curve`.
   void advanceAlong(const Step& step, const Channels& u, const Channels& curve) noexcept {
     const Channels chord = (u - u_) / step.dt, bend = 0.5 * step.dt * curve;
