@@ -1045,6 +1045,60 @@ TEST(Config, AnInertiaAboutAnotherPointIsThatOfTheSameBody) {
   EXPECT_EQ(about_point.p_BoBcm_B, about_center.p_BoBcm_B);
 }
 
+// A base is what its modes are, in whatever order they are told.
+TEST(Config, ModesAreKeptSoftestFirst) {
+  const auto modes = [](const char* frequencies, const char* ratios, const char* shapes) {
+    const Experiment e = test::experiment(
+        "z_sine", {fmt::format("base=!replace {{modes: {{frequency_hz: {}, damping_ratio: {}, "
+                               "generalized_mass: [1, 1, 1], shapes: [{}, [0, 0, 0], [0, 0, 0], "
+                               "[0, 0, 0], [0, 0, 0], [0, 0, 0]]}}, keep_modes: 2}}",
+                               frequencies, ratios, shapes)});
+    return std::get<ModalModel>(e.controller.vehicle.kind);
+  };
+  const ModalModel a = modes("[1, 2, 3]", "[0.1, 0.2, 0.3]", "[0.01, 0.02, 0.03]"),
+                   b = modes("[2, 3, 1]", "[0.2, 0.3, 0.1]", "[0.02, 0.03, 0.01]");
+  ASSERT_EQ(b.stiffness.size(), 2);
+  EXPECT_DOUBLE_EQ(b.stiffness(0), std::pow(2.0 * M_PI, 2));
+  EXPECT_DOUBLE_EQ(b.stiffness(1), std::pow(4.0 * M_PI, 2));
+  EXPECT_DOUBLE_EQ(b.damping(1, 1), 2.0 * 0.2 * 4.0 * M_PI);
+  EXPECT_EQ(b.Phi.row(0), Eigen::RowVector2d(0.01, 0.02));
+  EXPECT_EQ(a.Phi, b.Phi);
+  EXPECT_EQ(a.damping, b.damping);
+}
+
+// 0.3 - 0.2 is less than 0.1 in binary.
+TEST(Config, AFiringMayBeAsShortAsItsThrusterFires) {
+  const auto refused = [](const char* firing) {
+    return test::refusal([&] {
+      test::experiment("satellite_hold",
+                       {fmt::format("base.free.thrusters=[{{at_m: [0, 0, 0], force_n: [0, 1, 0], "
+                                    "least_on_s: 0.1, firings_s: [{}]}}]",
+                                    firing)});
+    });
+  };
+  EXPECT_EQ(refused("[0.2, 0.3]"), "");
+  EXPECT_NE(refused("[0.2, 0.2999]").find("is shorter than least_on_s"), std::string::npos);
+}
+
+// The servo model remembers the commands of twelve periods.
+TEST(Config, AServosDelayIsWithinWhatIsRemembered) {
+  const auto refused = [](double delay) {
+    return test::refusal([&] {
+      const auto six = [](double x) { return fmt::format("[{0}, {0}, {0}, {0}, {0}, {0}]", x); };
+      test::experiment("z_sine",
+                       {"controller.period_ns=5000000",
+                        fmt::format("servo={{date: 2026-01-01T00:00:00Z, extend_per_s: {0}, "
+                                    "extend_per_s_deviation: {1}, "
+                                    "retract_per_s: {0}, retract_per_s_deviation: {1}, tau_s: {2}, "
+                                    "tau_s_deviation: {1}, delay_s: {3}, delay_s_deviation: {1}}}",
+                                    six(20.0), six(0.001), six(0.0064), six(delay))});
+    });
+  };
+  EXPECT_EQ(refused(0.0599), "");
+  EXPECT_NE(refused(0.0601).find("want at most 0.06 s: 12 periods"), std::string::npos)
+      << refused(0.0601);
+}
+
 TEST(Config, AnExcitationIsProposedWhereTheBeliefIsWideAndNothingElseTells) {
   const auto proposed = [](std::vector<std::string> set) {
     set.insert(set.end(), test::kCompensated.begin(), test::kCompensated.end());

@@ -501,6 +501,10 @@ TEST(ContactResults, StandBesideFreeSpace) {
     EXPECT_NEAR(one[figure].get<double>(), due, 0.03 * due) << figure;
   }
   EXPECT_NEAR(one["began_s"].get<double>(), one["free_space_began_s"].get<double>(), 0.02);
+  const Contact free_space = *contactPairs(run.series, emulation(run.series)).at(0).free_space;
+  EXPECT_NE(free_space.peak, known.peak);
+  EXPECT_EQ(one["free_space_peak_n"], free_space.peak);
+  EXPECT_EQ(one["free_space_impulse_ns"], free_space.impulse.norm());
   const double e_ = s["contact_restitution"], due = s["contact_restitution_free_space"];
   EXPECT_NEAR(e_, due, 0.04);
   EXPECT_LT(std::abs(s["contact_energy_error"].get<double>()), 0.06);
@@ -519,6 +523,28 @@ TEST(ContactResults, StandBesideFreeSpace) {
   EXPECT_EQ(last("contacts"), 1.0);
   EXPECT_NEAR(last("x_target_rate_m_per_s"), machine.plant().truth().target.v.x(), 1e-12);
   EXPECT_GT(last("clearance_m"), 0.0);
+}
+
+TEST(ContactResults, TheMostEnergyPutInIsThatOfAnyTick) {
+  Series series;
+  const auto most = [&](const std::vector<double>& put_in) {
+    series.rows.clear();
+    for (const double joules : put_in) {
+      Row row;
+      row.state = {};
+      row.state.phase = static_cast<int>(Phase::kRunning);
+      row.state.kind = static_cast<int>(SegmentKind::kAdmittance);
+      row.state.energy_put_in = joules;
+      series.rows.push_back(row);
+    }
+    nlohmann::ordered_json out;
+    addEnergy(series, out);
+    EXPECT_EQ(out["energy_put_in_j"], put_in.back());
+    return out["energy_put_in_max_j"].get<double>();
+  };
+  EXPECT_EQ(most({3.0, 1.0, 2.0}), 3.0);
+  EXPECT_EQ(most({1.0, 3.0, 2.0}), 3.0);
+  EXPECT_EQ(most({1.0, 2.0, 3.0}), 3.0);
 }
 
 // What has been before admittance control is not counted; what still touches as it begins is.

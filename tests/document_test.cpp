@@ -67,6 +67,21 @@ TEST(Document, IsOneDocument) {
             std::string::npos);
 }
 
+TEST(Document, IsNoDeeperThanAPersonThinks) {
+  const auto nested = [](int depth, const std::string& open, const std::string& close) {
+    std::string text = "a: ";
+    for (int i = 0; i < depth; ++i) text += open;
+    text += "{b: 1}";
+    for (int i = 0; i < depth; ++i) text += close;
+    return parsed(text + "\n");
+  };
+  const std::pair<const char*, const char*> kinds[] = {{"[", "]"}, {"{c: ", "}"}, {"{<<: ", "}"}};
+  for (const auto& [open, close] : kinds) {
+    EXPECT_EQ(nested(13, open, close), "") << open;
+    EXPECT_NE(nested(17, open, close).find("nested deeper than"), std::string::npos) << open;
+  }
+}
+
 TEST(Document, HasNoMoreKeysThanAPersonWrites) {
   std::string text;
   for (int i = 0; i < 1001; ++i) text += fmt::format("k{}: 1\n", i);

@@ -217,6 +217,7 @@ TEST(UrdfFile, AFollowerHasToReachWhereItIsLed) {
       says(follower("0.5"), "joint 'f' follows 'j' over [-4, 4], beyond its own limits [-4, 0.5]"))
       << follower("0.5");
   EXPECT_FALSE(says(follower("4"), "beyond"));
+  EXPECT_FALSE(says(follower("3.9999999"), "beyond"));  // as far as such a number is written
 }
 
 TEST(UrdfFile, APictureNeverRefusesARobot) {
@@ -228,6 +229,8 @@ TEST(UrdfFile, APictureNeverRefusesARobot) {
        R"(<collision><geometry><mesh/></geometry></collision>)",
        R"(<visual><origin xyz="0 0"/><geometry><sphere radius="1"/></geometry></visual>)",
        R"(<visual><geometry><box size="1 1 1"/></geometry><material><color rgba="1 1"/></material></visual>)",
+       R"(<visual><geometry><box size="0 1 1"/></geometry></visual>)",
+       R"(<visual><geometry><sphere radius="1"/></geometry><material name="m" colour="red"/></visual>)",
        R"(<visual><xacro:grey/><geometry><sphere radius="1"/></geometry></visual>)"}) {
     Parts parts{.in_link = part};
     EXPECT_EQ(parts.refused(), "") << part;
