@@ -152,6 +152,7 @@ TEST(Gate, BarsAdmittanceControlUnlessForced) {
   forced.controller.stability = Stability::kForced;
   EXPECT_NE(applyStabilityCheck(forced), "");
   EXPECT_EQ(forced.controller.stability, Stability::kForced);
+  EXPECT_EQ(forced.controller.stability_uncompensated, Stability::kForced);
   Experiment good = test::unassessed("srms_deploy_doss");
   EXPECT_EQ(applyStabilityCheck(good), "");
   EXPECT_EQ(good.controller.stability, Stability::kStable);
@@ -224,6 +225,16 @@ TEST(Gate, LooksAtEachMotionWhateverElseThereIs) {
   EXPECT_TRUE(near(2, 75.0));
   EXPECT_TRUE(near(1, -45.0));  // begun before admittance control, and still under way in it
   EXPECT_NEAR(poses.back().q(0), 0.0, 1e-9);
+}
+
+// However long before it the robot has moved there.
+TEST(Gate, LooksAtThePoseInWhichAdmittanceControlBegins) {
+  const Experiment e = test::experiment(
+      "puma_on_table_4_1",
+      {"program=[{move: {}, robot: [{at_s: 0, duration_s: 2, joint: joint_1, to_deg_or_m: 70}]}, "
+       "{move: {duration_s: 3}}, {calibration: {}}, {admittance: {duration_s: 5}}]"});
+  const auto poses = programRobots(e.controller, e.plant.task);
+  EXPECT_NEAR(poses.back().q(0), 70.0 * kDegree, 1e-9);
 }
 
 TEST(Gate, TakesTheRobotAsTheControllerKnowsIt) {

@@ -123,6 +123,7 @@ def environment(**more):
 
 FIRST = 0.5  # s of tests in the first run of a mutant; each run after it is twice as long
 PATIENCE = 60.0  # s of tests after which a mutant that none has noticed counts as survived
+OF_A_SUITE = 3  # tests of one suite, before those of others have been tried
 LIVE = "test_programs"  # starts the programs as processes
 FEWEST = 500  # tests; fewer are found where the test programs are called otherwise
 FAULTS = "Faults.Table.published"  # the one test of ctest that is no gtest
@@ -184,11 +185,17 @@ def measure_coverage():
 
 def batches(record, tests, before):
     """The tests that pass the mutant, in runs of a test program: what noticed it last time, then small
-    runs of the quickest and most particular tests, then ever longer ones."""
+    runs of the quickest and most particular tests, a few of each suite first, then ever longer ones."""
     covering = [t for t in tests if record["id"] in t["seen"]]
     last = [t for t in covering if t["name"] == before.get(key_of(record))]
     rest = sorted((t for t in covering if t not in last),
                   key=lambda t: (t["seconds"] + 0.02) * len(t["seen"]) ** 0.5)
+    tried, turns = collections.Counter(), []
+    for t in rest:
+        suite = t["name"].split(".")[0]
+        turns.append(tried[suite] // OF_A_SUITE)
+        tried[suite] += 1
+    rest = [t for _, t in sorted(zip(turns, rest), key=lambda pair: pair[0])]
     out = [last] if last else []
     budget, spent = FIRST, 0.0
     while rest and spent < PATIENCE:
