@@ -170,6 +170,27 @@ TEST(Rdt, CountsAreScaledByTheSensorsOwnCalibration) {
   EXPECT_EQ(w.counts[1], -32768);
 }
 
+// 36 bytes, the most significant first: three counters and six counts.
+TEST(Rdt, RecordsAreTheirBytes) {
+  RdtRecord record;
+  record.sequence = 0x01020304;
+  record.sensor_sequence = 0x05060708;
+  record.status = 0x80000001;
+  record.counts = {1, -1, 0x0a0b0c0d, INT32_MIN, INT32_MAX, 7};
+  const auto bytes = encode(record);
+  const std::vector<int> wanted = {1,    2, 3, 4, 5,    6,    7,    8,    0x80, 0,    0,    1,
+                                   0,    0, 0, 1, 0xff, 0xff, 0xff, 0xff, 0x0a, 0x0b, 0x0c, 0x0d,
+                                   0x80, 0, 0, 0, 0x7f, 0xff, 0xff, 0xff, 0,    0,    0,    7};
+  EXPECT_EQ(std::vector<int>(bytes.begin(), bytes.end()), wanted);
+  const auto back = rdtRecord(bytes.data(), bytes.size());
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->sequence, record.sequence);
+  EXPECT_EQ(back->sensor_sequence, record.sensor_sequence);
+  EXPECT_EQ(back->status, record.status);
+  EXPECT_EQ(back->counts, record.counts);
+  EXPECT_FALSE(rdtRecord(bytes.data(), bytes.size() - 1));
+}
+
 TEST(Rdt, AWindowIsTheMeanOfItsRecordsAndAsFaultyAsTheWorst) {
   RdtStream stream(kCalibration, proc(), 10'000'000);
   const auto take = [&](std::uint32_t n, int newtons, std::uint32_t status = 0) {
@@ -412,6 +433,61 @@ TEST(StreamParser, FindsFramesInPiecesOfAnySizeAndAfterNoise) {
       Vec6 want;
       want << 1.5 * 19, -2.0, 3.0, 0.25, -0.5, 0.125;
       EXPECT_LT((wrenches.back() - want).norm(), 1e-12) << wrenches.back().transpose();
+    }
+}
+
+// What catalogues of checksums give for the digits from 1 to 9.
+TEST(StreamParser, EveryChecksumIsTheOneOfItsName) {
+  const std::string digits = "123456789";
+  for (const auto& [name, sum, size] : {std::tuple{"sum8", 0xddu, 1},
+                                        {"xor8", 0x31u, 1},
+                                        {"crc16_modbus", 0x4b37u, 2},
+                                        {"crc16_x25", 0x906eu, 2},
+                                        {"crc32", 0xcbf43926u, 4}})
+    for (const bool big : {false, true}) {
+      const auto frame = [&, size = size](std::uint32_t with) {
+        std::vector<std::uint8_t> out(13, 0);
+        out[0] = 1;
+        out[big ? 2 : 1] = 100;  // the first value
+        out.insert(out.end(), digits.begin(), digits.end());
+        for (int i = 0; i < size; ++i)
+          out.push_back(static_cast<std::uint8_t>(with >> 8 * (big ? size - 1 - i : i)));
+        return out;
+      };
+      StreamParser parser(
+          streamOf({fmt::format("checksum={}", name), "sync=[1]", "first=1",
+                    fmt::format("length={}", 22 + size), "checksum_over=[13, 22]", "checksum_at=22",
+                    fmt::format("byte_order={}", big ? "big" : "little")}));
+      EXPECT_TRUE(parsed(parser, frame(sum ^ 1u), 4).empty()) << name;
+      const auto got = parsed(parser, frame(sum), 4);
+      ASSERT_EQ(got.size(), 1u) << name << big;
+      EXPECT_NEAR(got[0](0), 1.0, 1e-12);
+      EXPECT_EQ(parser.malformed(), 1);
+    }
+}
+
+TEST(StreamParser, ValuesAreReadInTheirKindAndOrder) {
+  for (const std::string kind : {"int16", "int32", "float32"})
+    for (const bool big : {false, true}) {
+      const int size = kind == "int16" ? 2 : 4;
+      std::vector<std::uint8_t> frame = {1};
+      for (int k = 0; k < 6; ++k) {
+        const int number = k % 2 ? -300 * (k + 1) : 300 * (k + 1);
+        std::uint32_t raw = static_cast<std::uint32_t>(number);
+        if (kind == "float32") {
+          const auto real = static_cast<float>(number);
+          std::memcpy(&raw, &real, 4);
+        }
+        for (int i = 0; i < size; ++i)
+          frame.push_back(static_cast<std::uint8_t>(raw >> 8 * (big ? size - 1 - i : i)));
+      }
+      StreamParser parser(
+          streamOf({"values=" + kind, "checksum=none", "sync=[1]", "first=1",
+                    fmt::format("length={}", frame.size()), "scale=[1, 1, 1, 1, 1, 1]",
+                    fmt::format("byte_order={}", big ? "big" : "little")}));
+      const auto got = parsed(parser, frame, 3);
+      ASSERT_EQ(got.size(), 1u) << kind << big;
+      EXPECT_EQ(got[0], (Vec6() << 300, -600, 900, -1200, 1500, -1800).finished()) << kind << big;
     }
 }
 
@@ -724,7 +800,9 @@ TEST_F(Composed, EachPieceComesFromItsDriverAndTheRestIsSimulated) {
   const Sample rest = simulated.sample();
   const auto composed = [&](const std::string& piece, const std::string& channel) {
     Bus bus(kDefaultUrl), driver(kDefaultUrl);
-    Machine machine(test::experiment("puma_on_table_4_1", {"machine." + piece + "=external"}), bus);
+    Machine machine(test::experiment("puma_on_table_4_1",
+                                     {"machine." + piece + "=external", "sensor.noise=false"}),
+                    bus);
     machine.advance(0, monotonicNow());
     EXPECT_FALSE(machine.sample()) << piece;
     EXPECT_FALSE(machine.waitsFor().empty());
@@ -764,6 +842,12 @@ TEST_F(Composed, EachPieceComesFromItsDriverAndTheRestIsSimulated) {
   EXPECT_EQ(robot.legs, rest.legs);
   EXPECT_EQ(robot.faults, kRobotPiece);
   // The simulated sensor feels the weight of the robot where its joints really are.
+  plant::Plant there(
+      test::experiment("puma_on_table_4_1",
+                       {fmt::format("robot.joints_deg_or_m=[0, {}, 0, 0, 0, 0]", 0.25 / kDegree),
+                        "sensor.noise=false"})
+          .plant);
+  for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(robot.adc[i], there.sample().adc[i], 1.0) << i;
   EXPECT_FALSE(wrenchIs(robot, rest.adc));
   const Sample switches = composed("switches", channel::kSwitches);
   EXPECT_EQ(switches.switches, 1u);

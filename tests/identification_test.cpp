@@ -402,6 +402,24 @@ TEST_F(Identify, PlanRunMassesAndTheirUse) {
   }
 }
 
+// What a run has learnt stands in its folder, says whose it is, and serves the next one.
+TEST_F(Identify, WhatARunHasLearntServesTheNext) {
+  const auto error = [&](const std::string& name, const std::string& more) {
+    std::string line = "puma_on_table_4_1 --lockstep --no-plots --set sensor.readings_per_tick=4";
+    for (const char* on : {"feed_forward=true", "observer=true", "inertia=true", "wrench=aided"})
+      line += std::string(" --set controller.compensation.") + on;
+    const test::Output o = run(line + " --set 'plant_mismatch={mass: 1.05}' " + more + out(name));
+    EXPECT_EQ(o.status, 0) << o.text;
+    EXPECT_EQ(o.text.find("masses.yaml") != std::string::npos, name == "learns") << o.text;
+    return summary(folder_ / name)["emulation_error_rms_m"].get<double>();
+  };
+  const double believes = error("believes", "");
+  error("learns", "--set controller.compensation.learns_masses=true");
+  const std::string text = test::readText(file("learns/masses.yaml"));
+  EXPECT_EQ(text.rfind("# Masses that a run of puma_on_table_4_1 has learnt.", 0), 0u) << text;
+  EXPECT_LT(error("knows", "--masses " + file("learns/masses.yaml")), 0.5 * believes);
+}
+
 TEST_F(Identify, RefusesByName) {
   expectRefusal(app("identify") + "plan free_decay", "has no robot with joints");
   std::ofstream(file("space.yaml"))

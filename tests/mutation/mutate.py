@@ -123,6 +123,7 @@ def environment(**more):
 
 FIRST = 0.5  # s of tests in the first run of a mutant; each run after it is twice as long
 PATIENCE = 60.0  # s of tests after which a mutant that none has noticed counts as survived
+KILLS = collections.Counter()  # mutants by the test that noticed them, so far
 OF_A_SUITE = 3  # tests of one suite, before those of others have been tried
 LIVE = "test_programs"  # starts the programs as processes
 FEWEST = 500  # tests; fewer are found where the test programs are called otherwise
@@ -185,11 +186,13 @@ def measure_coverage():
 
 def batches(record, tests, before):
     """The tests that pass the mutant, in runs of a test program: what noticed it last time, then small
-    runs of the quickest and most particular tests, a few of each suite first, then ever longer ones."""
+    runs of the quickest tests, the most particular and those that noticed others, a few of each suite
+    first, then ever longer ones."""
     covering = [t for t in tests if record["id"] in t["seen"]]
     last = [t for t in covering if t["name"] == before.get(key_of(record))]
     rest = sorted((t for t in covering if t not in last),
-                  key=lambda t: (t["seconds"] + 0.02) * len(t["seen"]) ** 0.5)
+                  key=lambda t: (t["seconds"] + 0.02) * len(t["seen"]) ** 0.5
+                  / (1 + KILLS[t["name"]]))
     tried, turns = collections.Counter(), []
     for t in rest:
         suite = t["name"].split(".")[0]
@@ -222,6 +225,7 @@ def attack(record, tests, before):
         if killer and binary == LIVE:  # what waits for other processes can fail by itself
             killer = noticed(record, binary, names, allowed)
         if killer:
+            KILLS[killer] += 1
             return {**record, "killed_by": killer, "covered": covered}
     return {**record, "killed_by": None, "covered": covered}
 
