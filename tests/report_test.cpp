@@ -211,6 +211,106 @@ TEST(Figure, ThinningKeepsThePeakOfALongLine) {
 }
 
 #ifndef VES_SANITIZE  // a quarter of a minute without, minutes with
+/// The tables of a page, by rows and cells.
+std::vector<std::vector<std::vector<std::string>>> tablesOf(const std::string& html) {
+  std::vector<std::vector<std::vector<std::string>>> out;
+  const std::regex row("<tr>(.*?)</tr>"), cell("<t[hd][^>]*>(.*?)</t[hd]>");
+  for (std::size_t at = 0; (at = html.find("<table", at)) != std::string::npos;) {
+    const std::size_t end = html.find("</table>", at);
+    std::string text = html.substr(at, end - at);
+    std::replace(text.begin(), text.end(), '\n', ' ');
+    at = end;
+    out.emplace_back();
+    for (std::sregex_iterator r(text.begin(), text.end(), row), none; r != none; ++r) {
+      const std::string cells = (*r)[1];
+      out.back().emplace_back();
+      for (std::sregex_iterator c(cells.begin(), cells.end(), cell); c != none; ++c)
+        out.back().back().push_back((*c)[1]);
+    }
+  }
+  return out;
+}
+
+/// What is said of the eight runs on the Shuttle's arm, beside the numbers of each.
+void expectSaidAsMeasured(const Chapter4& chapter) {
+  const auto& srms = chapter.summary["srms"];
+  double full = 0.0, half = 0.0, split = 0.0, least = HUGE_VAL, most = 0.0, added = HUGE_VAL;
+  std::vector<std::vector<std::string>> sizes, distances, attitudes, damping;
+  const auto mm = [](double x) { return fmt::format("{:.2f}", x * 1e3); };
+  const auto mrad = [](double x) { return fmt::format("{:.3f}", x * 1e3); };
+  for (const auto& [name, one] : srms.items()) {
+    if (!one.is_object()) continue;
+    const double moved = one["displacement_max_m"], all = one["displacement_max_12_modes_m"],
+                 soft = one["displacement_max_12_modes_half_stiffness_m"],
+                 off = one["split_error_max_m"].get<double>() / moved;
+    full = std::max(full, all);
+    half = std::max(half, soft);
+    split = std::max(split, off);
+    if (name.ends_with("doss")) {
+      least = std::min(least, all);
+      most = std::max(most, soft);
+    }
+    sizes.push_back({std::to_string(one["modes_kept"].get<int>()), mm(moved), mm(all), mm(soft),
+                     fmt::format("{:.2f}", 100.0 * off)});
+    distances.push_back({mm(moved)});
+    attitudes.push_back({mrad(one["rotation_max_rad"])});
+    for (const std::string setting :
+         {"none_space_quiet", "none_space_noisy", "none_earth_quiet", "none_earth_noisy",
+          "outputs_space_quiet", "outputs_space_noisy", "outputs_earth_quiet",
+          "outputs_earth_noisy"}) {
+      const auto& run = one["ves"][setting];
+      distances.back().push_back(mm(run["position_error_rms_m"]) + " / " +
+                                 mm(run["position_error_max_m"]));
+      attitudes.back().push_back(mrad(run["attitude_error_rms_rad"]) + " / " +
+                                 mrad(run["attitude_error_max_rad"]));
+    }
+    for (const auto& mode : one["modes"]) {
+      damping.push_back({fmt::format("{:.3f}", mode["frequency_hz"].get<double>()),
+                         fmt::format("{:.4f}", mode["damping_ratio"].get<double>())});
+      for (const char* filters : {"ves_none", "ves_outputs"}) {
+        const double more = mode[filters]["damping_ratio_added"];
+        added = std::min(added, more);
+        EXPECT_NEAR(
+            more,
+            mode[filters]["damping_ratio"].get<double>() - mode["damping_ratio"].get<double>(),
+            1e-12);
+        damping.back().push_back(
+            fmt::format("{:.3f}", mode[filters]["frequency_hz"].get<double>()));
+        damping.back().push_back(fmt::format("{:+.4f}", more));
+      }
+    }
+  }
+  const auto says = [&](const std::string& where, const std::string& what) {
+    for (const auto& claim : chapter.summary["claims"])
+      if (claim["where"] == where) {
+        EXPECT_NE(claim["reached"].get<std::string>().find(what), std::string::npos)
+            << claim["reached"] << " and not " << what;
+      }
+  };
+  says("5",
+       fmt::format("{:.1f} cm with stiffness_scale 1, {:.1f} cm with 0.5", 100 * full, 100 * half));
+  says("4.3, figures 4.19 to 4.26", fmt::format("{:.1f} to {:.1f} cm", 100 * least, 100 * most));
+  says("4.3", fmt::format("at most {:.2f} percent", 100 * split));
+  says("4.3, figures 4.11 to 4.18", fmt::format("damping ratio {:+.4f}", added));
+  // The rows of a table without their titles.
+  const auto tables = tablesOf(chapter.html);
+  const auto expectTable = [&](const std::string& second, const std::string& third,
+                               const std::vector<std::vector<std::string>>& rows) {
+    const auto at = std::find_if(tables.begin(), tables.end(), [&](const auto& table) {
+      return table[0].size() > 2 && table[0][1] == second && table[0][2] == third;
+    });
+    ASSERT_NE(at, tables.end()) << second;
+    auto found = *at;
+    found.erase(found.begin());
+    for (auto& row : found) row.erase(row.begin());
+    EXPECT_EQ(found, rows) << second;
+  };
+  expectTable("modes kept", "those modes", sizes);
+  expectTable("displacement", "none, space", distances);
+  expectTable("rotation", "none, space", attitudes);
+  expectTable("SRMS-robot [Hz]", "zeta", damping);
+}
+
 TEST(Chapter4, EveryClaimHasItsVerdict) {
   const fs::path folder = fs::temp_directory_path() / ("ves_chapter4_" + std::to_string(getpid()));
   fs::create_directories(folder);
@@ -263,6 +363,7 @@ TEST(Chapter4, EveryClaimHasItsVerdict) {
     }
   }
   EXPECT_EQ(runs, 8);
+  expectSaidAsMeasured(chapter);
   EXPECT_EQ(chapter.summary["divergence"]["ended"], "stopped");
 }
 #endif
