@@ -131,5 +131,83 @@ TEST(Hindsight, OfAMassThatIsLearntTheBaseIsWhereItWouldBe) {
   EXPECT_LT(learntApart(4.0, 9e4), 2.0);
 }
 
+// --- What masses do to a body that floats --------------------------------------------------------
+
+/// A tumbling body with another on it, rigidly, of `scale` times its mass.
+struct Tumbling {
+  static constexpr double kTick = 0.002;  // [s]
+
+  FreeBody vehicle;
+  Mat6 M_1P;
+
+  Tumbling(double scale, bool fires) : vehicle(model(fires), kTick) {
+    RigidBody body;
+    body.mass = 20.0;
+    body.p_BoBcm_B = Vec3(0.4, -0.2, 0.5);
+    body.I_Bcm_B = Vec3(2.0, 1.0, 1.5).asDiagonal();
+    M_1P = scale * spatialMass(body);
+    vehicle.reset(Vec6::Zero(), M_1P);
+  }
+  static FreeBodyModel model(bool fires) {
+    FreeBodyModel out;
+    out.body_P.mass = 100.0;
+    out.body_P.p_BoBcm_B = Vec3(0.0, 0.1, -0.3);
+    out.body_P.I_Bcm_B = Vec3(20.0, 30.0, 25.0).asDiagonal();
+    out.v_IPo_I = Vec3(50.0, 0.0, -10.0);
+    out.w_IP_I = Vec3(0.3, 0.1, -0.2);
+    if (fires) {
+      Thruster& jet = out.propulsion.thrusters[0];
+      jet.p_PoT_P = Vec3(0.5, 0.0, -0.3);
+      jet.force_P = Vec3(0.0, 4.0, 1.0);
+      jet.firings[0] = {1.0, 3.0};
+      jet.size = 1;
+      out.propulsion.size = 1;
+    }
+    return out;
+  }
+  Mat6 M_1() const { return rotated(vehicle.state().R_IP, M_1P); }
+  void step() {
+    CarriedBody carried(M_1());
+    carried.R_IP_before = carried.R_IP = vehicle.state().R_IP;
+    vehicle.step({}, carried, kTick, 0.0);
+  }
+};
+
+TEST(Sensitivity, OfABodyThatFloatsIsTheDifferenceOfTwoThatTumble) {
+  for (const bool fires : {false, true})
+    for (const double heavier : {1.0, 1.5}) {  // from the middle on
+      constexpr double kMore = 1e-5;           // [-]
+      Tumbling one(1.0, fires), other(1.0 + kMore, fires);
+      Sensitivity s;
+      s.eta.resize(6, 1);
+      s.eta_dot.resize(6, 1);
+      s.momentum.resize(6, 1);
+      const auto momentum = [&] {
+        const RigidState& at = one.vehicle.state();
+        return MassColumns(one.M_1() * (Vec6() << at.v - one.vehicle.letGo(), at.w).finished());
+      };
+      begin(s, one.vehicle, momentum(), 0, 1);
+      for (int i = 0; i < 3000; ++i) {
+        if (i == 1500) {
+          for (Tumbling* t : {&one, &other}) t->vehicle.become({heavier, 1.0, 1.0});
+        }
+        one.step();
+        other.step();
+        advance(s, one.vehicle, momentum(), one.M_1(), Tumbling::kTick);
+      }
+      const RigidState &a = one.vehicle.state(), &b = other.vehicle.state();
+      Vec6 moved, faster;
+      moved << b.p - a.p, rotationVector(b.R_IP * a.R_IP.transpose());
+      faster << b.v - a.v, b.w - a.w;
+      EXPECT_GT(moved.head<3>().norm(), 0.05 * kMore);
+      EXPECT_GT(moved.tail<3>().norm(), 0.05 * kMore);
+      EXPECT_LT((moved / kMore - s.eta.col(0)).norm(), 0.01 * s.eta.norm())
+          << fires << heavier << '\n'
+          << (moved / kMore).transpose() << '\n'
+          << s.eta.transpose();
+      EXPECT_LT((faster / kMore - s.eta_dot.col(0)).norm(), 0.01 * s.eta_dot.norm()) << fires;
+    }
+}
+
 }  // namespace
 }  // namespace ves

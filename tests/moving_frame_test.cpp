@@ -170,6 +170,25 @@ TEST(Flight, ThreeTurnsAndAMileAreShownInAHandsBreadth) {
   }
 }
 
+// A robot 5 % heavier than believed, whose masses are learnt in flight: what they have done to a
+// vehicle that tumbles is taken back to second order, however fast it flies.
+TEST(Flight, WhatAWrongMassHasDoneIsTakenBack) {
+  const auto off = [](const char* learns, const char* speed) {
+    const RecordedRun run = recordLockstep(test::experiment(
+        "satellite_tumbling", {std::string("controller.compensation.learns_masses=") + learns,
+                               "sensor.noise=false", "plant_mismatch={mass: 1.05}",
+                               fmt::format("base.free.velocity_m_per_s=[{}, -3, 0]", speed)}));
+    EXPECT_TRUE(run.result.good());
+    return offTruth(run.series);
+  };
+  const Distance believed = off("false", "1"), learnt = off("true", "1"), fast = off("true", "50");
+  EXPECT_GT(believed.rms_position, 0.05);
+  EXPECT_LT(learnt.rms_position, 0.06 * believed.rms_position);
+  EXPECT_LT(learnt.rms_attitude, 0.06 * believed.rms_attitude);
+  EXPECT_NEAR(fast.rms_position, learnt.rms_position, 2e-5);
+  EXPECT_NEAR(fast.rms_attitude, learnt.rms_attitude, 2e-3 * kDegree);
+}
+
 TEST(Flight, TheEnergyThatIsPutInIsThatOfTheVehiclesWay) {
   // The same motion at 0 and at 50 m/s: forces do other work, and what the emulation adds to it is
   // the same.

@@ -59,6 +59,14 @@ TEST_P(NoHeap, FromArmingToParking) {
 
 TEST(NoHeapOnAShip, FromArmingToParking) { expectNoHeap(experiment("ship_arm")); }
 
+TEST(NoHeapInFlight, WhileMassesAreLearnt) {
+  expectNoHeap(experiment(
+      "satellite_tumbling",
+      {"controller.compensation.learns_masses=true", "plant_mismatch={mass: 1.05}",
+       "program=[{move: {}}, {calibration: {}}, {admittance: {duration_s: 12}, robot: [{at_s: 1, "
+       "duration_s: 2, joint: joint_1, to_deg_or_m: 40}, {at_s: 5, gripper: true}]}]"}));
+}
+
 TEST(NoHeapInFlight, FromArmingToParking) {
   expectNoHeap(
       experiment("servicer_capture",

@@ -80,10 +80,6 @@ MovingFrameSettings readMovingFrame(Section& controller, const Compensation& com
     s.fail("enabled",
            "what the laboratory does to the robot has to be told from what the robot does, "
            "want 'wrench: aided' in controller.compensation");
-  if (f.enabled && compensation.learns_masses)
-    s.fail("enabled",
-           "what a wrong mass has done to a vehicle that tumbles is not taken back yet, "
-           "want 'learns_masses: false' in controller.compensation");
   f.share = s.number("share", 0.01, 1.0);
   f.acceleration = s.number("acceleration_m_per_s2", 1e-4, 10.0);
   f.angular_acceleration = s.number("acceleration_deg_per_s2", 1e-3, 1e3) * kDegree;

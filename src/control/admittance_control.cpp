@@ -36,6 +36,7 @@ void AdmittanceControl::begin(const Vec6& x, const Mat6& M_1, double age, double
     model_.reset(x, M_1, ahead_);
   }
   begins_ = true;
+  unknown_ = frame_.enabled() ? 2 : 1;
   shaken_ = 0.0;
   oscillation_.reset();
   port_.reset();
@@ -51,8 +52,11 @@ const PathPoint<6>& AdmittanceControl::step(const AdmittanceInput& in, const Pat
                                             const PathChecks& checks) noexcept {
   if (in.F_Po_E.stacked().allFinite()) {
     const double since = begins_ ? std::min(in.wrench.since, period_) : in.wrench.since;
-    if (begins_ && aided_) hindsight_.reset(model_, in.lesson);
     begins_ = false;
+    if (unknown_ > 0) {
+      --unknown_;
+      if (aided_) hindsight_.reset(model_, in.lesson);
+    }
     change_.advance(model_);
     const double ahead = inertia_ ? in.wrench.age + in.share * wrench_delay_ : 0.0;
     if (frame_.enabled()) {  // as far as what is shown goes, late as a tick may be

@@ -188,9 +188,14 @@ void AidedWrench::take(const Input& in, const Mat6& counts_per_wrench,
     twist_.advance(twist_.prepare(since), twist.array());
   settled_ = true;
   const Vec6 felt = twist_.output().matrix();
-  regressor_.evaluate(X_PL0_, gravity_,
-                      {in.X_IP.R, felt.head<3>(), felt.tail<3>(), in.joints.q(), in.joints.q_dot()},
-                      lesson_.momentum, weight_);
+  const JointVector &q = in.joints.q(), &q_dot = in.joints.q_dot();
+  if (in.emulated.flies)
+    regressor_.evaluate(X_PL0_, gravity_,
+                        {in.emulated.R_EP, in.emulated.v, in.emulated.w, q, q_dot},
+                        lesson_.momentum, weight_);
+  regressor_.evaluate(X_PL0_, gravity_, {in.X_IP.R, felt.head<3>(), felt.tail<3>(), q, q_dot},
+                      momentum_, weight_);
+  if (!in.emulated.flies) lesson_.momentum = momentum_;
   open_ = std::max(0, open_ - 1);
   doubts_ = std::max(0, doubts_ - 1);
   withholds_ = open_ == 0;
@@ -208,7 +213,7 @@ void AidedWrench::take(const Input& in, const Mat6& counts_per_wrench,
     in_group_ = 0;
     residual_sum_.setZero();
     group_time_ = 0.0;
-    momentum_before_ = lesson_.momentum;
+    momentum_before_ = momentum_;
     weight_before_ = weight_;
     lesson_.group_ends = true;  // where it begins
   } else {
@@ -227,8 +232,8 @@ void AidedWrench::endGroup(const Mat6& counts_per_wrench) noexcept {
   const Sum& last = sums_[groups_++ % sums_.size()];
   Sum& sum = sums_[groups_ % sums_.size()];
   MassColumns one;
-  one.noalias() = counts_per_wrench * (0.5 * (weight_before_ + weight_) -
-                                       (lesson_.momentum - momentum_before_) / group_time_);
+  one.noalias() = counts_per_wrench *
+                  (0.5 * (weight_before_ + weight_) - (momentum_ - momentum_before_) / group_time_);
   sum.columns = last.columns + one;
   sum.y = last.y + residual_sum_ / Lesson::kGroup;
   sum.y.noalias() += one * used_;
@@ -236,7 +241,7 @@ void AidedWrench::endGroup(const Mat6& counts_per_wrench) noexcept {
   residual_sum_.setZero();
   group_time_ = 0.0;
   in_group_ = 0;
-  momentum_before_ = lesson_.momentum;
+  momentum_before_ = momentum_;
   weight_before_ = weight_;
   unknown_ = belief_.variance(one);
   if (isForce(1, belief_)) return;

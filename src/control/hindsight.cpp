@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace ves {
 
@@ -14,11 +15,10 @@ Hindsight::Hindsight(double period) : period_(period) {
 void Hindsight::reset(const AdmittanceModel& model, const Lesson& lesson) noexcept {
   const ModalDynamics& base = model.dynamics();
   const Eigen::Index k = base.size(), n = lesson.momentum.cols();
-  eta_.setZero(k, n);
-  eta_dot_.setZero(k, n);
-  momentum_.resize(k, n);
-  mass_ = model.factors().mass;
-  momentum_.noalias() = base.Phi().transpose() * lesson.momentum / mass_;
+  learns_.eta.resize(k, n);
+  learns_.eta_dot.resize(k, n);
+  learns_.momentum.resize(k, n);
+  begun_ = false;
   withheld_ = passed_ = owed_ = due_ = past_[0] = base.atRest();
   kept_ = 1;
   remaining_ = 0;
@@ -31,21 +31,17 @@ void Hindsight::step(const AdmittanceModel& model, const Mat6& M_1, double dt,
   if (!(dt > 0.0)) return;
   const ModalDynamics& base = model.dynamics();
   const double mass = model.factors().mass;
-  if (mass != mass_) {  // its velocity stays
-    momentum_ = (mass_ * momentum_ + (mass - mass_) * eta_dot_) / mass;
-    mass_ = mass;
-  }
   const ModalDynamics::Body body = model.body(M_1);
   const ModalDynamics::Forces none = ModalDynamics::Forces::Zero(base.size());
-  if (lesson.momentum.cols() == eta_.cols() && lesson.hand >= 0) {
-    eta_.middleCols<4>(lesson.hand).setZero();
-    momentum_.middleCols<4>(lesson.hand).noalias() =
-        base.Phi().transpose() * lesson.momentum.middleCols<4>(lesson.hand) / mass;
-  }
-  if (lesson.momentum.cols() == eta_.cols()) learn(base, body, mass, dt, lesson.momentum);
+  const bool learns = lesson.momentum.cols() == learns_.eta.cols();
+  if (learns && !begun_)
+    model.begin(learns_, lesson.momentum, 0, learns_.eta.cols());
+  else if (learns && lesson.hand >= 0)
+    model.begin(learns_, lesson.momentum, lesson.hand, 4);
+  if (learns && std::exchange(begun_, true)) model.advance(learns_, lesson.momentum, M_1, dt);
   if (remaining_ > 0) owed_ = base.advance(body, dt, owed_, none);
-  if (lesson.learnt.size() == eta_.cols() && lesson.learnt.size() > 0)
-    owe({eta_ * lesson.learnt, eta_dot_ * lesson.learnt}, 1.0);
+  if (lesson.learnt.size() == learns_.eta.cols() && lesson.learnt.size() > 0)
+    owe({learns_.eta * lesson.learnt, learns_.eta_dot * lesson.learnt}, 1.0);
 
   const auto force = [&](const Wrench& F_Po_I) -> ModalDynamics::Forces {
     return base.Phi().transpose() * F_Po_I.stacked() / mass;
@@ -77,23 +73,6 @@ void Hindsight::step(const AdmittanceModel& model, const Mat6& M_1, double dt,
   owed_.eta -= due_.eta;
   owed_.eta_dot -= due_.eta_dot;
   --remaining_;
-}
-
-/// (1 + Phi^T M_1 Phi) eta' + Phi^T p, per parameter, changes by what springs and dampers take.
-void Hindsight::learn(const ModalDynamics& base, const ModalDynamics::Body& body, double mass,
-                      double dt, const MassColumns& momentum) noexcept {
-  eta_dot_ = momentum_;
-  eta_dot_.noalias() -= base.Phi().transpose() * momentum / mass;
-  const MassColumns pull = body.pull * eta_dot_;
-  eta_dot_.noalias() -= base.Phi().transpose() * pull;
-  // A mode that turns by more than this in a step follows at once, and hardly moves.
-  constexpr double kMostAngle = 1.5;  // [rad]
-  for (Eigen::Index i = 0; i < base.size(); ++i)
-    if (base.stiffness()(i) * dt * dt > kMostAngle * kMostAngle) eta_dot_.row(i).setZero();
-  eta_ += dt * eta_dot_;
-  const ModalDynamics::Forces none = ModalDynamics::Forces::Zero(base.size());
-  for (Eigen::Index j = 0; j < eta_.cols(); ++j)
-    momentum_.col(j) += dt * base.acceleration({eta_.col(j), eta_dot_.col(j)}, none);
 }
 
 void Hindsight::owe(const Modes& more, double sign) noexcept {

@@ -68,6 +68,8 @@ Emulated MovingFrame::emulated(const Mat3& R_IP, const BodyMotion& E_P,
   Emulated out = emulated(R_IP);
   out.R_EP = rotationOf(since * E_P.w) * E_P.X.R;
   out.R_EI = out.R_EP * R_IP.transpose();
+  out.v = E_P.v;
+  out.w = E_P.w;
   return out;
 }
 

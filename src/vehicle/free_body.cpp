@@ -137,6 +137,7 @@ void FreeBody::reset(const Vec6& x, const Mat6& M_1, double ahead) noexcept {
   now_.pulses = {};
   now_.ordered = {};
   thrust_ = {};
+  joints_.setZero();
   if (ahead > 0.0 && !(velocity(s).isZero(0.0) && model_.orbit.rate == 0.0))
     s = advanced(whole_, whole_, s, {}, -ahead, model_.orbit);
 }
@@ -162,6 +163,7 @@ void FreeBody::step(const Wrench& F_Po_I, const CarriedBody& carried, double dt,
   damping_ = -damping * (middle * (velocity(from) - along_));
   Wrench F = Wrench::from(F_Po_I.stacked() + damping_), F_ahead = F;
   pushed_.setZero();
+  jets_.setZero();
   const Propulsion& jets = model_.propulsion;
   if (jets.any()) {
     const Mat3 R_PI = from.R_IP.transpose();
@@ -180,7 +182,7 @@ void FreeBody::step(const Wrench& F_Po_I, const CarriedBody& carried, double dt,
     now_.pulses = spent(now_.pulses, dt);
     now_.time += dt;
     after.h_P = wheels(now_.time);
-    pushed_ = pushed.stacked();
+    pushed_ = jets_ = pushed.stacked();
     if (dt > 0.0) pushed_.tail<3>() -= from.R_IP * (after.h_P - before.h_P) / dt;
     F_ahead = F_ahead + inI(fires(now_.time, ahead).mean, dt + 0.5 * ahead);
   }
@@ -198,6 +200,7 @@ void FreeBody::step(const Wrench& F_Po_I, const CarriedBody& carried, double dt,
   way_ << s.p - from.p, rotationVector(s.R_IP * from.R_IP.transpose());
   now_.rigid = s;
   whole_ = after;
+  joints_ = carried.joints;
   if (!(ahead > 0.0)) F_ahead = F;
   const Gyrostat then{after.M_P, wheels(now_.time + ahead)};
   Wrench shown = F_ahead;
@@ -233,6 +236,12 @@ BodyMotion FreeBody::coasting() const noexcept {
 BodyMotion FreeBody::atWrench() const noexcept {
   const RigidState& s = now_.rigid;
   return {{s.R_IP, s.p}, s.v, s.w, Vec3::Zero(), Vec3::Zero()};
+}
+
+Vec6 FreeBody::momentum() const noexcept {
+  Vec6 out = massOfAll() * velocity(now_.rigid) + joints_;
+  out.tail<3>() += now_.rigid.R_IP * whole_.h_P;
+  return out;
 }
 
 double FreeBody::kineticEnergy() const noexcept {

@@ -94,7 +94,7 @@ std::vector<std::string> drawSettings(Dice& dice, const Scenario& scenario) {
     maybe(0.5, c + "ramp_s", fmt::format("{:.2f}", std::exp(dice.between(-4.0, 1.6))));
   }
   if (scenario.floats()) {
-    const bool flies = aided && !learns && dice.chance(0.7);
+    const bool flies = aided && dice.chance(0.7);
     put("controller.moving_frame.enabled", flies ? "true" : "false");
     maybe(0.3, "controller.moving_frame.steady_in_contact", "true");
     if (flies) maybe(0.3, "base.free.velocity_m_per_s", "[20, -3, 0]");

@@ -64,8 +64,10 @@ class AdmittanceControl {
   const MovingFrame& frame() const noexcept { return frame_; }
   /// How a platform turned by R_IP is emulated; `since` [s]: of a wrench after the last step's.
   Emulated emulated(const Mat3& R_IP, double since) const noexcept {
-    return frame_.enabled() ? frame_.emulated(R_IP, model_.atWrench(), since)
-                            : frame_.emulated(R_IP);
+    if (!frame_.enabled()) return frame_.emulated(R_IP);
+    Emulated out = frame_.emulated(R_IP, model_.atWrench(), since);
+    out.v -= model_.letGo();
+    return out;
   }
 
   const Oscillation& oscillation() const noexcept { return oscillation_; }
@@ -87,6 +89,8 @@ class AdmittanceControl {
   double wrench_delay_;   // [s]
   double ahead_ = 0.0;    // [s] of the last wrench, that is shown
   bool begins_ = true;    // the first step: what was before it does not count
+  int unknown_ = 1;       // [-] steps until hindsight knows what the robot was let go with: with a
+                          // vehicle that flies it has that motion a step later
   Oscillation oscillation_;
   double shaken_ = 0.0;  // [J] by the ground so far
   PortWork port_;

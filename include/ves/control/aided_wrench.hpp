@@ -145,7 +145,8 @@ class AidedWrench {
   bool begun_ = false, taking_ = false;  // a calibration
   bool taught_ = false;
 
-  MassColumns weight_;                           // of the newest sample, about Po in I
+  MassColumns weight_;    // of the newest sample, about Po in I
+  MassColumns momentum_;  // of the robot in the laboratory, as Lesson::momentum
   MassColumns momentum_before_, weight_before_;  // as the group began
   Vec6 residual_sum_ = Vec6::Zero();
   double group_time_ = 0.0;      // [s]

@@ -30,7 +30,7 @@ class Hindsight {
  public:
   explicit Hindsight(double period);  // [s]
 
-  /// The base begins, at rest.
+  /// The base begins: with the momentum of the next step's lesson, of as many parameters as this.
   void reset(const AdmittanceModel& base, const Lesson& lesson) noexcept;
   /// After a step of dt [s] of the base with M_1 on it.
   void step(const AdmittanceModel& base, const Mat6& M_1, double dt, const Lesson& lesson) noexcept;
@@ -42,20 +42,15 @@ class Hindsight {
   static constexpr std::size_t kKept = Lesson::kGroups + 1;  // [-] ends of groups
 
   using Modes = ModalDynamics::Modes;
-  using Sensitivity =
-      Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxModes, kMaxMassParameters>;
-
-  void learn(const ModalDynamics& base, const ModalDynamics::Body& body, double mass, double dt,
-             const MassColumns& momentum) noexcept;
   void owe(const Modes& more, double sign) noexcept;
 
-  double period_;                         // [s]
-  int slide_;                             // [-] steps over which a correction is given
-  Sensitivity eta_, eta_dot_, momentum_;  // of the modes per parameter; momentum of base and robot
-  double mass_ = 1.0;                     // [-] of the base, that momentum_ is over
-  Modes withheld_;                        // what the base has not done,
-  Modes passed_;                          // and what it has, of what it was given of late
-  std::array<Modes, kKept> past_{};       // a ring, the newest at kept_ - 1
+  double period_;                    // [s]
+  int slide_;                        // [-] steps over which a correction is given
+  Sensitivity learns_;               // of the modes per parameter,
+  bool begun_ = false;               // which counts
+  Modes withheld_;                   // what the base has not done,
+  Modes passed_;                     // and what it has, of what it was given of late
+  std::array<Modes, kKept> past_{};  // a ring, the newest at kept_ - 1
   std::size_t kept_ = 0;
   Modes owed_, due_;
   int remaining_ = 0;  // [-] steps

@@ -27,6 +27,8 @@ struct Emulated {
   Mat3 R_EP = Mat3::Identity();
   bool flies = false;  // the laboratory does; without, E is I, and nothing more is said
   Mat3 R_EI = Mat3::Identity();
+  // [m/s], [rad/s] of Po and P in E, where it flies: beside what the vehicle was let go with.
+  Vec3 v = Vec3::Zero(), w = Vec3::Zero();
 };
 
 class MovingFrame {

@@ -9,6 +9,7 @@
 
 #include "ves/vehicle/free_body.hpp"
 #include "ves/vehicle/modal_vehicle.hpp"
+#include "ves/vehicle/sensitivity.hpp"
 
 namespace ves {
 
@@ -160,6 +161,19 @@ class AdmittanceModel {
   }
   ModalDynamics::Body body(const Mat6& M_1) const noexcept {
     return each([&](const auto& v) { return v.body(M_1); });
+  }
+  /// [m/s] Of Po, that it begins with.
+  Vec3 letGo() const noexcept {
+    return each([](const auto& v) -> Vec3 { return v.letGo(); });
+  }
+  /// Sensitivities (sensitivity.hpp) count from now, and one step of dt [s] on.
+  void begin(Sensitivity& s, const MassColumns& momentum, Eigen::Index first,
+             Eigen::Index count) const noexcept {
+    each([&](const auto& v) { ves::begin(s, v, momentum, first, count); });
+  }
+  void advance(Sensitivity& s, const MassColumns& momentum, const Mat6& M_1,
+               double dt) const noexcept {
+    each([&](const auto& v) { ves::advance(s, v, momentum, M_1, dt); });
   }
   int modes() const noexcept {
     return each([](const auto& v) { return v.modes(); });

@@ -105,6 +105,14 @@ class FreeBody {
 
   /// At the last step's end, not ahead of it.
   const RigidState& state() const noexcept { return now_.rigid; }
+  const Vec3& letGo() const noexcept { return model_.v_IPo_I; }  // [m/s] how it began
+  /// [N s, N m s] of all that floats, the robot's joints and the wheels included, about Po in I.
+  Vec6 momentum() const noexcept;
+  /// [N, N m] its thrusters in the last step, about Po in I.
+  const Vec6& jets() const noexcept { return jets_; }
+  /// Spatial mass about Po in I of the vehicle, over factors().mass, and of all that floats.
+  Mat6 massOfOne() const noexcept { return rotated(now_.rigid.R_IP, M_P_); }
+  Mat6 massOfAll() const noexcept { return rotated(now_.rigid.R_IP, whole_.M_P); }
 
  private:
   struct State {
@@ -124,13 +132,15 @@ class FreeBody {
   ModalDynamics beside_;
   double period_;  // [s]
   VehicleFactors factors_;
-  double dt_ = 0.0;  // [s] of the last step
-  Gyrostat whole_;   // with the robot
+  double dt_ = 0.0;             // [s] of the last step
+  Gyrostat whole_;              // with the robot
+  Vec6 joints_ = Vec6::Zero();  // [N s, N m s] momentum of its joints beside that
   State now_, before_;
   Thrust thrust_;                 // of the last step
   Vec6 way_ = Vec6::Zero();       // [m, rad] of the last step, in I
   Vec6 along_ = Vec6::Zero();     // [m/s, rad/s] that energies and damping count from
-  Vec6 pushed_ = Vec6::Zero();    // [N, N m] by thrusters in it, in I
+  Vec6 jets_ = Vec6::Zero();      // [N, N m] by thrusters in it, in I,
+  Vec6 pushed_ = Vec6::Zero();    // and by all but the robot
   Vec6 damping_ = Vec6::Zero();   // [N, N m] in it
   Mat6 mobility_ = Mat6::Zero();  // [1/kg] in it: acceleration per wrench
 };

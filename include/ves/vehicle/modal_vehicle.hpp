@@ -247,6 +247,7 @@ class ModalVehicle {
     return dynamics_.body(M_1 / factors_.mass);
   }
   int modes() const noexcept { return static_cast<int>(dynamics_.size()); }
+  Vec3 letGo() const noexcept { return Vec3::Zero(); }
   bool coupled() const noexcept { return dynamics_.coupled(); }
 
  private:
