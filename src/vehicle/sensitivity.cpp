@@ -7,7 +7,7 @@ namespace ves {
 
 void begin(Sensitivity& s, const ModalVehicle& vehicle, const MassColumns& momentum,
            Eigen::Index first, Eigen::Index count) noexcept {
-  s.mass = vehicle.factors().mass;
+  if (first == 0) s.mass = vehicle.factors().mass;
   s.eta.middleCols(first, count).setZero();
   s.eta_dot.middleCols(first, count).setZero();
   s.momentum.middleCols(first, count).noalias() =
@@ -55,11 +55,13 @@ Vec6 turned(const Vec3& th, const Vec6& y) noexcept {
 
 void begin(Sensitivity& s, const FreeBody& vehicle, const MassColumns& momentum, Eigen::Index first,
            Eigen::Index count) noexcept {
-  s.mass = vehicle.factors().mass;
   s.eta.middleCols(first, count).setZero();
   s.eta_dot.middleCols(first, count).setZero();
   const Vec3& p = vehicle.state().p;
-  if (first == 0) s.origin = p;
+  if (first == 0) {
+    s.mass = vehicle.factors().mass;
+    s.origin = p;
+  }
   for (Eigen::Index j = first; j < first + count; ++j)
     s.momentum.col(j) = about(p - s.origin, momentum.col(j));
 }
