@@ -447,6 +447,8 @@ TEST_F(Sweep, RefusesByName) {
   refused("z_sine" + out("s"), "one run only");
   refused("z_sine --vary seed=1,2 --until 0.1" + out("s"), "--until requires --figure");
   refused("z_sine --vary seed=1,2 --figure nothing" + out("s"), "--figure 'nothing': no such");
+  refused("z_sine --vary seed=1,2 --figure 'z_err>1'" + out("s"),
+          "--figure 'z_err>1': no such column, did you mean 'z_error_");
   EXPECT_FALSE(std::filesystem::exists(folder_ / "s"));  // what is refused leaves nothing
   refused("z_sine --vary seed=1,2 --figure 'seed>x'" + out("s"), "--figure 'seed>x': want COLUMN");
   refused("z_sine --vary seed=1,2 --design sobol" + out("s"), "--design: places draws");

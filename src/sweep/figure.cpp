@@ -9,6 +9,7 @@
 
 #include "number.hpp"
 #include "ves/core/errors.hpp"
+#include "ves/core/spelling.hpp"
 
 namespace ves {
 Figure::Figure(const std::string& text) : text_(text), column_(text) {
@@ -23,6 +24,10 @@ Figure::Figure(const std::string& text) : text_(text), column_(text) {
 
 void Figure::find(const std::vector<std::string>& header) {
   const auto at = std::find(header.begin(), header.end(), column_);
+  const std::string meant = at == header.end() ? nearest(column_, header) : std::string();
+  if (!meant.empty())
+    throw InputError(
+        fmt::format("--figure '{}': no such column, did you mean '{}'?", text_, meant));
   if (at == header.end())
     throw InputError(
         fmt::format("--figure '{}': no such column; there are {}", text_, fmt::join(header, ", ")));
