@@ -38,7 +38,7 @@ void Hindsight::step(const AdmittanceModel& model, const Mat6& M_1, double dt,
     model.begin(learns_, lesson.momentum, 0, learns_.eta.cols());
   else if (learns && lesson.hand >= 0)
     model.begin(learns_, lesson.momentum, lesson.hand, 4);
-  if (learns && std::exchange(begun_, true)) model.advance(learns_, lesson.momentum, M_1, dt);
+  if (learns && std::exchange(begun_, true)) model.advance(learns_, lesson.momentum, body, dt);
   if (remaining_ > 0) owed_ = base.advance(body, dt, owed_, none);
   if (lesson.learnt.size() == learns_.eta.cols() && lesson.learnt.size() > 0)
     owe({learns_.eta * lesson.learnt, learns_.eta_dot * lesson.learnt}, 1.0);

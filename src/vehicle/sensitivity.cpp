@@ -16,7 +16,7 @@ void begin(Sensitivity& s, const ModalVehicle& vehicle, const MassColumns& momen
 
 /// (1 + Phi^T M_1 Phi) eta' + Phi^T p, per parameter, changes by what springs and dampers take.
 void advance(Sensitivity& s, const ModalVehicle& vehicle, const MassColumns& momentum,
-             const Mat6& M_1, double dt) noexcept {
+             const ModalDynamics::Body& body, double dt) noexcept {
   const ModalDynamics& base = vehicle.dynamics();
   const double mass = vehicle.factors().mass;
   if (mass != s.mass) {  // its velocity stays
@@ -25,7 +25,7 @@ void advance(Sensitivity& s, const ModalVehicle& vehicle, const MassColumns& mom
   }
   s.eta_dot = s.momentum;
   s.eta_dot.noalias() -= base.Phi().transpose() * momentum / mass;
-  const MassColumns pull = vehicle.body(M_1).pull * s.eta_dot;
+  const MassColumns pull = body.pull * s.eta_dot;
   s.eta_dot.noalias() -= base.Phi().transpose() * pull;
   // A mode that turns by more than this in a step follows at once, and hardly moves.
   constexpr double kMostAngle = 1.5;  // [rad]
@@ -70,8 +70,8 @@ void begin(Sensitivity& s, const FreeBody& vehicle, const MassColumns& momentum,
 /// thrusters, which turn with it. Displaced by d, turned by th and as much faster as it is turned
 /// besides (V*), vehicle and robot of momentum P have, about Po, P + th x P + M V* + p per
 /// parameter.
-void advance(Sensitivity& s, const FreeBody& vehicle, const MassColumns& momentum, const Mat6&,
-             double dt) noexcept {
+void advance(Sensitivity& s, const FreeBody& vehicle, const MassColumns& momentum,
+             const ModalDynamics::Body&, double dt) noexcept {
   const RigidState& at = vehicle.state();
   const Mat6 M_all = vehicle.massOfAll();
   const Vec3& along = vehicle.letGo();

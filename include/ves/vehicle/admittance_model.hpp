@@ -171,9 +171,9 @@ class AdmittanceModel {
              Eigen::Index count) const noexcept {
     each([&](const auto& v) { ves::begin(s, v, momentum, first, count); });
   }
-  void advance(Sensitivity& s, const MassColumns& momentum, const Mat6& M_1,
+  void advance(Sensitivity& s, const MassColumns& momentum, const ModalDynamics::Body& body,
                double dt) const noexcept {
-    each([&](const auto& v) { ves::advance(s, v, momentum, M_1, dt); });
+    each([&](const auto& v) { ves::advance(s, v, momentum, body, dt); });
   }
   int modes() const noexcept {
     return each([](const auto& v) { return v.modes(); });

@@ -31,10 +31,10 @@ void begin(Sensitivity& s, const ModalVehicle& vehicle, const MassColumns& momen
 void begin(Sensitivity& s, const FreeBody& vehicle, const MassColumns& momentum, Eigen::Index first,
            Eigen::Index count) noexcept;
 
-/// After a step of dt [s] of the vehicle, the robot of M_1 on it.
+/// After a step of dt [s] of the vehicle; `body`: of the robot on it.
 void advance(Sensitivity& s, const ModalVehicle& vehicle, const MassColumns& momentum,
-             const Mat6& M_1, double dt) noexcept;
-void advance(Sensitivity& s, const FreeBody& vehicle, const MassColumns& momentum, const Mat6& M_1,
-             double dt) noexcept;
+             const ModalDynamics::Body& body, double dt) noexcept;
+void advance(Sensitivity& s, const FreeBody& vehicle, const MassColumns& momentum,
+             const ModalDynamics::Body& body, double dt) noexcept;
 
 }  // namespace ves
