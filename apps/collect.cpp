@@ -10,6 +10,7 @@
 #include "ves/bus/channels.hpp"
 #include "ves/bus/ordered_log.hpp"
 #include "ves/core/build.hpp"
+#include "ves/evaluation/let_go.hpp"
 #include "ves/export/ros2.hpp"
 #include "ves/run/follow_bus.hpp"
 #include "ves/series/series.hpp"
@@ -18,33 +19,38 @@ namespace ves::app {
 
 namespace {
 
-/// A whole log, or the run on the bus as it happens.
-int writeMcap(const std::string& log, const std::string& url, const std::string& file,
-              const std::optional<Experiment>& without) {
+int writeMcap(const Series& series, const std::string& log, const std::string& file) {
+  const std::optional<Emulation> both = emulation(series);
+  const auto poses = both ? basePoses(series, both->base) : std::map<std::int64_t, Vec6>();
+  McapExport out(series.experiment, series.version, file, [&](const Row& row) {
+    const auto at = poses.find(row.state.header.sequence);
+    return at == poses.end() ? std::nullopt : std::optional<Vec6>(at->second);
+  });
+  Damage damage;  // told with the series
+  OrderedLog reader(log, &damage);
+  for (LogEvent event; reader.next(event);) out.add(event);
+  out.finish();
+  return kDone;
+}
+
+/// The run on the bus as it happens.
+int followIntoMcap(const std::string& url, const std::string& file) {
+  catchSignals();
+  fmt::print(stderr, "waiting for a run on {}; Ctrl-C ends\n", url);
+  std::optional<FollowedBase> base;
   std::optional<McapExport> out;
   const auto begin = [&](const experiment_t& m) {
-    out.emplace(parseExperiment(m.resolved, channel::kExperiment), m.version, file);
+    const Experiment e = parseExperiment(m.resolved, channel::kExperiment);
+    base.emplace(e);
+    out.emplace(e, m.version, file, [&](const Row& row) {
+      base->add(row);
+      return base->at(row.state);
+    });
   };
-  if (log.empty()) {
-    catchSignals();
-    fmt::print(stderr, "waiting for a run on {}; Ctrl-C ends\n", url);
-    if (!followBus(
-            url, [] { return stop_requested != 0; }, begin,
-            [&](const LogEvent& event) { out->add(event); }))
-      throw InputError(fmt::format("bus {}: no run, nothing is written", url));
-  } else {
-    Damage damage;
-    OrderedLog reader(log, &damage);
-    LogEvent event;
-    if (without) out.emplace(*without, describeBuild(), file);
-    while (reader.next(event)) {
-      if (event.channel == channel::kExperiment && !out) begin(event.require<experiment_t>(log));
-      if (out) out->add(event);
-    }
-    printDamage(damage);
-    if (!out)
-      throw InputError(fmt::format("{}: no configuration in this log; --scenario names one", log));
-  }
+  if (!followBus(
+          url, [] { return stop_requested != 0; }, begin,
+          [&](const LogEvent& event) { out->add(event); }))
+    throw InputError(fmt::format("bus {}: no run, nothing is written", url));
   out->finish();
   return kDone;
 }
@@ -77,8 +83,9 @@ int collectCommand(int argc, char** argv) {
     if (follow == !log.empty() || (follow && mcap.empty()))
       throw InputError("want a log, or --follow with --mcap FILE");
     joinIfNamed(join);
-    if (!mcap.empty()) return writeMcap(log, url, mcap, scenarioOfLog(scenario));
+    if (follow) return followIntoMcap(url, mcap);
     const Series series = seriesOf(log, scenario);
+    if (!mcap.empty()) return writeMcap(series, log, mcap);
     std::vector<Column> chosen;
     std::vector<bool> used(select.size(), false);
     for (const Column& column : columns(series.experiment))

@@ -10,7 +10,7 @@
 #include "ves/analysis/appendix_e.hpp"
 #include "ves/analysis/gate.hpp"
 #include "ves/analysis/loop.hpp"
-#include "ves/evaluation/comparison.hpp"
+#include "ves/evaluation/let_go.hpp"
 #include "ves/evaluation/tool_motion.hpp"
 #include "ves/math/dense.hpp"
 #include "ves/run/run.hpp"
@@ -281,22 +281,90 @@ TEST(Distance, OfAToolIsThatOfItsPoints) {
   EXPECT_NEAR(d.rms, std::sqrt((3 * 1e-4 + 25e-4) / 4.0), 1e-12);
 }
 
-// The program's motions of the robot did not happen in what was ordered by hand.
-TEST(Comparison, IsOfWhatTheProgramDid) {
-  Series series;
-  series.experiment = test::experiment("puma_on_table_4_1");
+// Only what the program says of robot and vehicle is known in free space, and from where it was let
+// go on.
+TEST(LetGo, SaysWhyItCannotBeCompared) {
+  const Experiment puma = test::experiment("puma_on_table_4_1"),
+                   alone = test::experiment("free_decay"),
+                   flight = test::experiment("satellite_tumbling");
+  Row before, after;
+  before.state = after.state = {};
+  after.state.phase = static_cast<int>(Phase::kRunning);
+  after.state.kind = static_cast<int>(SegmentKind::kAdmittance);
+  after.state.segment = 2;
+  after.state.vehicle_mass = after.state.vehicle_damping = after.state.vehicle_stiffness = 1.0;
+  const auto why = [](const Experiment& e, const std::vector<Row>& rows) {
+    LetGo let_go(e);
+    for (const Row& row : rows) let_go.add(row);
+    return let_go.whyNotCompared();
+  };
+  EXPECT_EQ(why(puma, {before}), "");
+  EXPECT_EQ(why(puma, {before, after}), "");
+  EXPECT_NE(why(puma, {after}).find("not in the log"), std::string::npos);
+
+  Row by_hand = after;
+  by_hand.state.segment = -1;
+  EXPECT_NE(why(puma, {before, by_hand}).find("ordered by hand"), std::string::npos);
+  EXPECT_EQ(why(alone, {before, by_hand}), "");
+
+  Row heavier = after;
+  heavier.state.vehicle_mass = 2.0;
+  EXPECT_NE(why(puma, {before, after, heavier}).find("was changed"), std::string::npos);
+  heavier.state.segment = 3;  // another one
+  EXPECT_EQ(why(puma, {before, after, heavier}), "");
+
+  Row pushed = after;
+  pushed.has_truth = true;
+  pushed.truth = {};
+  pushed.truth.pushes = 1;
+  pushed.truth.push_duration = 0.1;
+  EXPECT_EQ(why(puma, {before, after, pushed}), "");
+  EXPECT_NE(why(flight, {before, after, pushed}).find("flies along"), std::string::npos);
+}
+
+// It says when the motion in free space is another one, and only then: somebody computes it anew.
+TEST(LetGo, SaysWhenSomethingElseHappened) {
+  LetGo let_go(test::experiment("satellite_jets"));
   Row row;
   row.state = {};
+  EXPECT_FALSE(let_go.add(row));
+  EXPECT_FALSE(let_go.begun());
   row.state.phase = static_cast<int>(Phase::kRunning);
   row.state.kind = static_cast<int>(SegmentKind::kAdmittance);
   row.state.vehicle_mass = row.state.vehicle_damping = row.state.vehicle_stiffness = 1.0;
-  row.state.segment = 2;
-  series.rows = {row};
-  EXPECT_EQ(whyNotCompared(series), "");
-  series.rows[0].state.segment = -1;
-  EXPECT_NE(whyNotCompared(series).find("ordered by hand"), std::string::npos);
-  series.experiment = test::experiment("free_decay");  // without a robot
-  EXPECT_EQ(whyNotCompared(series), "");
+  const auto next = [&](double left) {
+    row.state.vehicle_time += 0.01;
+    row.state.thrust_left[3] = left;
+    return let_go.add(row);
+  };
+  EXPECT_TRUE(next(0.0));
+  EXPECT_TRUE(let_go.begun());
+  EXPECT_FALSE(next(0.0));
+  EXPECT_TRUE(next(0.3));  // an order at 0.03 s
+  EXPECT_FALSE(next(0.29));
+  EXPECT_TRUE(next(0.5));  // another in its place
+  EXPECT_FALSE(next(0.49));
+  EXPECT_TRUE(next(0.1));  // a shorter one
+  EXPECT_FALSE(next(0.09));
+  ASSERT_EQ(let_go.firings().size(), 1u);
+  EXPECT_EQ(let_go.firings()[0].thruster, 3);
+  EXPECT_NEAR(let_go.firings()[0].on.from, 0.03, 1e-12);
+  EXPECT_NEAR(let_go.firings()[0].on.until, 0.17, 1e-12);
+  row.state.vehicle_time = 0.5;
+  EXPECT_TRUE(next(0.1));
+  EXPECT_EQ(let_go.firings().size(), 2u);
+  row.has_truth = true;
+  row.truth = {};
+  row.truth.pushes = 1;
+  row.truth.push_duration = 0.2;
+  row.truth.push_began_ns = 1;
+  EXPECT_TRUE(next(0.09));
+  EXPECT_FALSE(next(0.08));
+  row.state.segment = 1;  // over
+  row.truth.pushes = 2;
+  EXPECT_FALSE(next(0.5));
+  EXPECT_EQ(let_go.pushes().size(), 1u);
+  EXPECT_EQ(let_go.firings().size(), 2u);
 }
 
 // A stop came before the vehicle had gone far.

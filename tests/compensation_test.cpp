@@ -15,7 +15,7 @@
 #include "ves/analysis/gate.hpp"
 #include "ves/config/servo.hpp"
 #include "ves/control/gravity_compensation.hpp"
-#include "ves/evaluation/comparison.hpp"
+#include "ves/evaluation/let_go.hpp"
 #include "ves/evaluation/identified.hpp"
 #include "ves/identification/sensor_timing.hpp"
 #include "ves/identification/servo_identification.hpp"

@@ -47,7 +47,7 @@ const std::map<std::string, Names> kMayInclude = [] {
   add("evaluation", {"identification"}, "series");
   add("pictures", {}, "evaluation");
   add("results", {}, "pictures");
-  add("export", {}, "evaluation");
+  add("export", {}, "series");
   add("page", {}, "evaluation");
   add("validation", {"page"}, "pictures");
   add("acceptance", {}, "validation");

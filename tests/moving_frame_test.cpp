@@ -6,7 +6,7 @@
 
 #include "support/rig.hpp"
 #include "ves/control/moving_frame.hpp"
-#include "ves/evaluation/comparison.hpp"
+#include "ves/evaluation/let_go.hpp"
 #include "ves/kinematics/stewart.hpp"
 #include "ves/plant/lockstep.hpp"
 #include "ves/run/run.hpp"
@@ -254,7 +254,7 @@ TEST(Flight, APlatformAtItsLimitsLeavesTheVehicleAlone) {
   // The commanded flight against free space; of the hard braking a little is taken for a touch.
   const std::vector<Transform> poses = emulatedPoses(run.series);
   ReferenceMotions references;
-  const auto truth = baseMotion(run.series.experiment, Vec6::Zero(), references);
+  const auto truth = baseMotion(run.series.experiment, letGoOf(run.series), references);
   ASSERT_TRUE(truth);
   for (std::size_t k = 0; k + 1 < truth->x.size() && k < poses.size(); k += 10) {
     const Pose x = Pose::from(truth->x[k + 1]);

@@ -7,7 +7,7 @@
 
 #include <set>
 
-#include "ves/evaluation/comparison.hpp"
+#include "ves/evaluation/let_go.hpp"
 #include "ves/series/series.hpp"
 
 namespace ves {
@@ -222,7 +222,7 @@ TEST_F(Programs, AFlightControllerHoldsASatelliteThatTurns) {
       most = std::max(most, Vec6::Map(row.state.x).tail<3>().cwiseAbs().maxCoeff());
   // Left alone it turns by 4.8 degrees about x.
   EXPECT_LT(most, 2.5 * kDegree);
-  EXPECT_GT(firingsOf(series).size(), 3U);
+  EXPECT_GT(letGoOf(series).firings().size(), 3U);
   EXPECT_LT(summary(folder_ / "a")["emulation_error_attitude_share"].get<double>(), 0.01);
 }
 

@@ -7,7 +7,7 @@
 
 #include "support/rig.hpp"
 #include "ves/analysis/loop.hpp"
-#include "ves/evaluation/comparison.hpp"
+#include "ves/evaluation/let_go.hpp"
 #include "ves/math/dense.hpp"
 #include "ves/run/run.hpp"
 #include "ves/validation/chapter4.hpp"

@@ -9,8 +9,9 @@
 #include <map>
 #include <random>
 
+#include "support/followed.hpp"
 #include "support/rig.hpp"
-#include "ves/evaluation/comparison.hpp"
+#include "ves/evaluation/let_go.hpp"
 #include "ves/run/replay.hpp"
 #include "ves/run/run.hpp"
 #include "ves/series/series.hpp"
@@ -172,9 +173,10 @@ TEST(Thrust, ByOrdersMovesThePlatformAsFreeSpaceHasIt) {
     }
     ASSERT_GT(given, 10);
     const Series series = readSeries(log);
-    EXPECT_GT(firingsOf(series).size(), 8U);
+    EXPECT_GT(letGoOf(series).firings().size(), 8U);
     const auto both = emulation(series);
     ASSERT_TRUE(both);
+    test::expectFollowed(series, both->base);
     const Distance off = distance(both->platform, both->base), moved = travel(both->base);
     EXPECT_GT(moved.rms_position, 5e-3);
     EXPECT_LT(off.rms_position, 5e-3 * moved.rms_position);

@@ -13,6 +13,7 @@
 #include <regex>
 #include <set>
 
+#include "support/followed.hpp"
 #include "support/refusal.hpp"
 #include "support/rig.hpp"
 #include "support/robots.hpp"
@@ -132,6 +133,47 @@ TEST(Scene, TheForceIsShownOnceTheSensorsBiasIsKnown) {
   }
   EXPECT_GT(hidden, 100);
   EXPECT_GT(known, 200);
+}
+
+// What a wheel gives the vehicle it has lost: torque times time.
+TEST(Scene, WheelsHaveTakenWhatTheyGave) {
+  const RecordedRun run = recordLockstep(test::experiment(
+      "satellite_puma", {"program=[{calibration: {}}, {admittance: {duration_s: 3}}]",
+                         "base.free.wheels=[{axis: [0, 0, 2], most_nms: 20, torques_s_nm: [[1, "
+                         "1.5, 0.8], [2, 2.25, -3]]}, {axis: [1, 0, 0], most_nms: 20, "
+                         "torques_s_nm: [[0, 1, 0.5]]}]"}));
+  const Scene scene(run.series.experiment);
+  const auto d = scene.description();
+  ASSERT_EQ(d["wheels"].size(), 2u);
+  EXPECT_EQ(d["wheels"][0]["axis"], (nlohmann::json{0.0, 0.0, 1.0}));
+  EXPECT_NEAR(d["wheels"][0]["most"].get<double>(), 0.4, 1e-12);
+  const std::vector<Column> all = columns(run.series.experiment);
+  const auto column = [&](const std::string& name) {
+    return std::find_if(all.begin(), all.end(), [&](const Column& c) { return c.name == name; });
+  };
+  ASSERT_NE(column("wheel1_nms"), all.end());
+  const auto& scalars = d["scalars"];
+  const std::size_t before = 7 * d["frames"].size() + 3 * d["arm"].size();
+  int ticks = 0;
+  eachTick(run.series, [&](const Row& row, double t) {
+    // The vehicle's clock is a few ticks behind.
+    const double first = t < 0.98   ? 0.0
+                         : t < 1.6  ? NAN
+                         : t < 1.98 ? -0.4
+                         : t < 2.35 ? NAN
+                                    : 0.35,
+                 second = t < 1.1 ? NAN : -0.5;
+    const std::vector<float> picture = scene.picture(row, {});
+    for (const auto& [name, due] : {std::pair("wheel0", first), std::pair("wheel1", second)}) {
+      if (std::isnan(due)) continue;
+      EXPECT_NEAR(column(fmt::format("{}_nms", name))->value(row), due, 1e-9) << t;
+      const auto at = std::find(scalars.begin(), scalars.end(), fmt::format("{}_momentum", name));
+      ASSERT_NE(at, scalars.end());
+      EXPECT_NEAR(picture[before + static_cast<std::size_t>(at - scalars.begin())], due, 1e-6);
+      ++ticks;
+    }
+  });
+  EXPECT_GT(ticks, 300);
 }
 
 TEST(Scene, TheArmEndsInThePlatformAndStandsAtItsRoot) {
@@ -426,10 +468,7 @@ TEST(BaseMotion, IsKnownFromItsStartToItsEnd) {
   EXPECT_TRUE(base.point(last));
   EXPECT_FALSE(base.point(last + 1));
   // Live, it begins where the platform is let go: the same motion.
-  ReferenceMotions references;
-  const auto live = baseMotion(run.series.experiment, commanded(run.series).x.front(), references);
-  ASSERT_TRUE(live);
-  EXPECT_EQ(*live->point(last), *base.point(last));
+  test::expectFollowed(run.series, base);
 }
 
 TEST(Still, IsADrawingOfEveryBody) {

@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 
 #include "ves/core/coordinates.hpp"
-#include "ves/evaluation/comparison.hpp"
+#include "ves/evaluation/let_go.hpp"
 
 namespace ves {
 

@@ -36,56 +36,6 @@ void eachTick(const Series& series, const std::function<void(const Row&, double)
   }
 }
 
-namespace {
-
-/// In the laboratory at a time [ns].
-PathPoint<6> shownIn(const Laboratory& lab, std::int64_t time, const Vec6& x, const Vec6& x_dot) {
-  const BodyMotion E_P = bodyMotion(Vec3::Zero(), Pose::from(x), x_dot, Vec6::Zero());
-  return coordinates(relative(lab.at(time), E_P));
-}
-
-/// As far as the run went: a stop may have come before the segment's end.
-Motion asFarAs(const Series& series, Motion motion) {
-  std::int64_t first = -1, last = -1;
-  eachTick(series, [&](const Row& row, double) {
-    last = row.state.header.sequence;
-    if (first < 0) first = last;
-  });
-  const auto gone = static_cast<std::size_t>(last - first) + 2;
-  for (auto* list : {&motion.x, &motion.x_dot}) list->resize(std::min(list->size(), gone));
-  motion.t.resize(std::min(motion.t.size(), gone));
-  return motion;
-}
-
-/// A motion in E from the first tick on, as the laboratory that flew in the run would have shown
-/// it.
-Motion shown(const Series& series, Motion motion) {
-  const std::int64_t period = series.experiment.controller.period;
-  std::vector<const Row*> rows;
-  eachTick(series, [&](const Row& row, double) { rows.push_back(&row); });
-  if (rows.empty()) return motion;
-  const std::int64_t first = rows.front()->state.header.sequence;
-  std::size_t row = 0;
-  for (std::size_t k = 0; k < motion.x.size(); ++k) {
-    const std::int64_t tick = first + static_cast<std::int64_t>(k);
-    while (row + 1 < rows.size() && rows[row + 1]->state.header.sequence <= tick) ++row;
-    const state_t& s = rows[row]->state;
-    const std::int64_t time = s.machine_time_ns + (tick - s.header.sequence) * period;
-    const Vec6 x_dot = motion.x_dot.empty() ? Vec6(Vec6::Zero()) : motion.x_dot[k];
-    const PathPoint<6> there = shownIn(laboratoryOf(s), time, motion.x[k], x_dot);
-    motion.x[k] = there.x;
-    if (!motion.x_dot.empty()) motion.x_dot[k] = there.x_dot;
-  }
-  return motion;
-}
-
-}  // namespace
-
-Vec6 shownAt(const state_t& state, const Vec6& x) noexcept {
-  const Laboratory lab = laboratoryOf(state);
-  return lab.flies() ? shownIn(lab, state.machine_time_ns, x, Vec6::Zero()).x : x;
-}
-
 Motion commanded(const Series& series) {
   const double period =
       static_cast<double>(series.experiment.controller.period) * kSecondPerNanosecond;
@@ -116,28 +66,6 @@ Motion actual(const Series& series) {
   return out;
 }
 
-std::shared_ptr<const std::optional<Motion>> ReferenceMotions::of(const Interaction& interaction,
-                                                                  std::int64_t step,
-                                                                  std::int64_t duration) {
-  return known_.of({interaction, step, duration}, [&]() -> std::optional<Motion> {
-    ++computed_;
-    InteractionOptions options;
-    options.model = InteractionModel::kWhole;
-    options.step = step;
-    options.duration = duration;
-    try {
-      return motion(simulate(interaction, options));
-    } catch (const std::domain_error&) {
-      return {};
-    }
-  });
-}
-
-std::optional<Emulation> emulation(const Series& series) {
-  ReferenceMotions references;
-  return emulation(series, references);
-}
-
 namespace {
 
 /// What of a pose no mode can express: it stays.
@@ -146,105 +74,6 @@ Vec6 restOf(const ModalModel& base, const Vec6& x) {
 }
 
 }  // namespace
-
-std::optional<Motion> baseMotion(const Experiment& e, const Vec6& start,
-                                 ReferenceMotions& references,
-                                 const std::vector<TimedAction>* pushes,
-                                 const std::vector<OrderedFiring>& firings) {
-  if (!wantsAdmittance(e.controller.program)) return {};
-  std::int64_t duration = 0;
-  Interaction interaction = interactionOf(e, duration);
-  interaction.start = start;
-  interaction.firings = firings;
-  if (pushes) {
-    std::erase_if(interaction.actions,
-                  [](const TimedAction& one) { return std::holds_alternative<Push>(one.action); });
-    interaction.actions.insert(interaction.actions.end(), pushes->begin(), pushes->end());
-    std::stable_sort(interaction.actions.begin(), interaction.actions.end(),
-                     [](const TimedAction& a, const TimedAction& b) { return a.start < b.start; });
-  }
-  return *references.of(interaction, e.controller.period, duration);
-}
-
-bool ofConfiguredVehicle(const state_t& s) noexcept {
-  return s.vehicle_mass == 1.0 && s.vehicle_damping == 1.0 && s.vehicle_stiffness == 1.0;
-}
-
-std::string whyNotCompared(const Series& series) {
-  const auto first = std::find_if(series.rows.begin(), series.rows.end(),
-                                  [](const Row& row) { return inAdmittance(row.state); });
-  if (first == series.rows.end()) return "";
-  if (first->state.segment < 0 && !series.experiment.plant.task.robot_events.empty())
-    return "it was ordered by hand, without the motions of the robot that its program has";
-  if (!std::all_of(series.rows.begin(), series.rows.end(),
-                   [](const Row& row) { return ofConfiguredVehicle(row.state); }))
-    return "the vehicle was changed on the way";
-  if (series.experiment.controller.moving_frame.enabled && !pushesOf(series).empty())
-    return "it was pushed in a laboratory that flies along";
-  return "";
-}
-
-bool ToldPushes::add(const Row& row) {
-  if (!inAdmittance(row.state) || !row.has_truth) return false;
-  const truth_t& m = row.truth;
-  if (!start_) start_ = row.state.machine_time_ns;
-  if (m.pushes <= seen_) return false;
-  seen_ = m.pushes;
-  // One may last from before.
-  const std::int64_t begun = m.push_began_ns - *start_;
-  const double before = static_cast<double>(std::max<std::int64_t>(0, -begun));
-  const double rest = m.push_duration - before * kSecondPerNanosecond;
-  if (!(rest > 0.0)) return false;
-  list_.push_back({std::max<std::int64_t>(0, begun),
-                   Push{static_cast<Push::On>(m.push_on), m.push_link, Vec3::Map(m.push_point),
-                        Vec3::Map(m.push_force), rest}});
-  return true;
-}
-
-std::vector<TimedAction> pushesOf(const Series& series) {
-  ToldPushes told;
-  for (const Row& row : series.rows) told.add(row);
-  return told.list();
-}
-
-bool firesByOrder(const state_t& s) noexcept {
-  return std::any_of(std::begin(s.thrust_left), std::end(s.thrust_left),
-                     [](double left) { return left > 0.0; });
-}
-
-std::vector<OrderedFiring> firingsOf(const Series& series) {
-  constexpr double kSame = 1e-9;  // [s]
-  std::vector<OrderedFiring> out;
-  std::array<std::size_t, kMostThrusters> last{};  // of each in `out`, from 1
-  eachTick(series, [&](const Row& row, double) {
-    const state_t& s = row.state;
-    for (std::size_t i = 0; i < last.size(); ++i) {
-      if (!(s.thrust_left[i] > 0.0)) continue;
-      const double until = s.vehicle_time + s.thrust_left[i];
-      if (last[i] > 0 && out[last[i] - 1].on.until > s.vehicle_time - kSame) {
-        out[last[i] - 1].on.until = until;  // it goes on, or another order came
-      } else {
-        out.push_back({static_cast<int>(i), {std::max(0.0, s.vehicle_time), until}});
-        last[i] = out.size();
-      }
-    }
-  });
-  return out;
-}
-
-std::optional<Emulation> emulation(const Series& series, ReferenceMotions& references) {
-  if (!whyNotCompared(series).empty()) return {};
-  Emulation out;
-  out.platform = actual(series);
-  if (out.platform.x.size() < 2) return {};
-  const std::vector<TimedAction> pushes = pushesOf(series);
-  auto base = baseMotion(series.experiment, commanded(series).x.front(), references, &pushes,
-                         firingsOf(series));
-  if (!base) return {};
-  base = asFarAs(series, *base);
-  out.base = series.experiment.controller.moving_frame.enabled ? shown(series, *base) : *base;
-  return out;
-}
 
 Amplitude amplitude(const Experiment& experiment, const Motion& base) {
   if (base.x.empty()) return {};

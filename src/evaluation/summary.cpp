@@ -220,7 +220,7 @@ void addFlight(const Series& series, nlohmann::ordered_json& out) {
 void addEmulation(const Series& series, const std::optional<Emulation>& e,
                   nlohmann::ordered_json& out) {
   if (!e) {
-    if (const std::string why = whyNotCompared(series); !why.empty())
+    if (const std::string why = letGoOf(series).whyNotCompared(); !why.empty())
       out["emulation_not_compared"] = why;
     return;
   }

@@ -69,8 +69,12 @@ std::string camel(const std::string& type) {
 
 class McapExport::Impl {
  public:
-  Impl(const Experiment& experiment, const std::string& version, const std::string& file)
-      : experiment_(experiment), version_(version), out_(file, "ros2", "ves " + version) {
+  Impl(const Experiment& experiment, const std::string& version, const std::string& file,
+       BaseOf base)
+      : experiment_(experiment),
+        version_(version),
+        out_(file, "ros2", "ves " + version),
+        base_(std::move(base)) {
     open();
   }
 
@@ -86,9 +90,7 @@ class McapExport::Impl {
       return;
     }
     const auto state = event.as<state_t>();
-    const bool first = tick_ < 0;
     if (!state || !ours(*state)) return;
-    followBase(*state, first);
     // Its truth and its sample came before it: the row of the one before is not needed.
     rows_.add(*state);
     tick(*rows_.finish(), now);
@@ -173,21 +175,6 @@ class McapExport::Impl {
     return true;
   }
 
-  /// The base in free space, from where the platform is let go in the first admittance segment.
-  void followBase(const state_t& state, bool first) {
-    // Ordered by hand, the robot does not move as its program has it (whyNotCompared).
-    const bool foreseen = state.segment >= 0 || experiment_.plant.task.robot_events.empty();
-    const bool begins = !first && base_start_ < 0 && inAdmittance(state) && foreseen;
-    if (begins) {
-      base_start_ = state.header.sequence;
-      base_segment_ = state.segment;
-      base_ = baseMotion(experiment_, Vec6::Map(state.x_desired), references_);
-    }
-    if (!ofConfiguredVehicle(state) || firesByOrder(state) || state.segment != base_segment_ ||
-        state.phase != static_cast<int>(Phase::kRunning))
-      base_.reset();
-  }
-
   void message(const LogEvent& event, std::int64_t now) {
     const auto own = own_.find(event.channel);
     if (own == own_.end()) return;
@@ -245,10 +232,8 @@ class McapExport::Impl {
     robotFrames(q, true, "", moving);
     const Transform X_EI = emulatedFrom(row.state);
     if (laboratoryOf(row.state).flies()) moving.push_back({"emulated", "inertial", X_EI});
-    if (const auto base =
-            base_ ? base_->point(row.state.header.sequence - base_start_) : std::nullopt) {
-      moving.push_back(
-          {"inertial", "ghost/platform", geometry.fromHome(Pose::from(shownAt(row.state, *base)))});
+    if (const auto base = base_(row)) {
+      moving.push_back({"inertial", "ghost/platform", geometry.fromHome(Pose::from(*base))});
       robotFrames(q, true, "ghost/", moving);
     }
     transforms(tf_, now, moving);
@@ -335,12 +320,9 @@ class McapExport::Impl {
   std::map<std::int64_t, std::int64_t> clocks_;  // [ns] by source: from its own clock
   std::map<std::pair<std::string, std::int64_t>, std::int64_t> last_;  // [-] sequence
   RowMaker rows_;
-  Identity controller_;     // whose run it is
-  std::int64_t tick_ = -1;  // the last
-  ReferenceMotions references_;
-  std::optional<Motion> base_;
-  std::int64_t base_start_ = -1;  // tick
-  int base_segment_ = -1;
+  BaseOf base_;
+  Identity controller_;                                                 // whose run it is
+  std::int64_t tick_ = -1;                                              // the last
   std::map<std::string, std::pair<std::uint16_t, LcmDefinition>> own_;  // by LCM channel
   std::uint16_t tf_ = 0, tf_static_ = 0, description_ = 0, joints_ = 0, wrench_ = 0, legs_ = 0,
                 words_ = 0;
@@ -348,8 +330,8 @@ class McapExport::Impl {
 };
 
 McapExport::McapExport(const Experiment& experiment, const std::string& version,
-                       const std::string& file)
-    : impl_(std::make_unique<Impl>(experiment, version, file)) {}
+                       const std::string& file, BaseOf base)
+    : impl_(std::make_unique<Impl>(experiment, version, file, std::move(base))) {}
 McapExport::~McapExport() = default;
 void McapExport::add(const LogEvent& event) { impl_->add(event); }
 void McapExport::finish() { impl_->finish(); }

@@ -3,7 +3,7 @@
 const UP = new THREE.Vector3(0, 1, 0);  // of three.js's cylinders
 const AHEAD = new THREE.Vector3(0, 0, 1);
 const SOLID = {plate: 0x6b7885, cylinder: 0x8d99a6, axes: 0x333333};
-const ROBOT = 0xe0903a, WORLD = 0x5b8c6a, GHOST = 0x7a5cc0, NOZZLE = 0x444444, PLUME = 0xff9d2e;
+const ROBOT = 0xe0903a, WORLD = 0x5b8c6a, GHOST = 0x7a5cc0, NOZZLE = 0x444444, PLUME = 0xff9d2e, WHEEL = 0x2f6f8f;
 const ARROWS = {wrench: 0xc1121f, contact: 0x0a7d5a, push: 0x1f5fbf};
 const TRAIL = 10;  // [s]
 
@@ -51,6 +51,12 @@ class Bodies {
       jet.position.set(...one.at);
       this.frames.platform.add(jet);
       return jet.plume;
+    });
+    this.wheels = (recording.scene.wheels || []).map(one => {
+      const wheel = new Wheel(new THREE.Vector3(...one.axis), 0.5 * Math.min(1, recording.scene.size), one.most);
+      wheel.position.set(...one.at);
+      this.frames.platform.add(wheel);
+      return wheel;
     });
     // White booms between dark joints, as the Shuttle's arm has them.
     const part = (geometry, colour) => {
@@ -120,6 +126,7 @@ class Bodies {
     this.root.updateMatrixWorld(true);
     this.placeArrows(i, show.newtonsPerMetre, size);
     this.plumes.forEach((plume, k) => { plume.visible = (r.scalar(i, 'thrusters_on') >> k & 1) === 1; });
+    this.wheels.forEach((wheel, k) => wheel.turn(r.scalar(i, `wheel${k}_momentum`), r.time(i)));
     const points = r.scene.arm.map((p, k) =>
       new THREE.Vector3(...p).addScaledVector(new THREE.Vector3(...r.bent(i, k)), show.times));
     this.armJoints.forEach((mesh, k) => {
@@ -231,6 +238,29 @@ class Jet extends THREE.Group {
     this.plume = part(new THREE.ConeBufferGeometry(0.06 * size, 0.4 * size, 16).rotateX(Math.PI).translate(0, -0.25 * size, 0),
                       new THREE.MeshBasicMaterial({color: PLUME, transparent: true, opacity: 0.7}));
     this.quaternion.setFromUnitVectors(UP, force.normalize());
+  }
+}
+
+/** A reaction wheel about `axis`. It turns as fast as it has momentum, once a second with the `most` of its schedule. */
+class Wheel extends THREE.Group {
+  constructor(axis, size, most) {
+    super();
+    this.most = most;
+    this.time = NaN;
+    this.rotor = new THREE.Group();
+    const part = geometry => this.rotor.add(new THREE.Mesh(geometry, new THREE.MeshStandardMaterial({color: WHEEL, roughness: 0.4, metalness: 0.5})));
+    const radius = 0.22 * size;
+    part(new THREE.TorusBufferGeometry(radius, 0.12 * radius, 12, 48).rotateX(Math.PI / 2));
+    for (const k of [0, 1, 2]) part(new THREE.BoxBufferGeometry(2 * radius, 0.06 * radius, 0.12 * radius).rotateY(k * Math.PI / 3));
+    part(new THREE.CylinderBufferGeometry(0.1 * radius, 0.1 * radius, 0.5 * radius, 16));
+    this.rotor.position.y = 0.3 * size;  // several about one place do not meet
+    this.add(this.rotor);
+    this.quaternion.setFromUnitVectors(UP, axis);
+  }
+  turn(momentum, time) {
+    const passed = time - this.time;
+    if (Math.abs(passed) < 1 && this.most > 0) this.rotor.rotation.y += 2 * Math.PI * momentum / this.most * passed;
+    this.time = time;
   }
 }
 

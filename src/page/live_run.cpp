@@ -16,17 +16,6 @@ constexpr std::int64_t kSecond = 1'000'000'000;      // [ns]
 constexpr std::int64_t kRepeat = kSecond / 5;        // [ns] without an answer
 constexpr int kStopTimes = 10, kVehicleTimes = 100;  // [-] the stability check takes its time
 
-/// Pushes that were told, and those of the program that are still to come.
-std::vector<TimedAction> allPushes(const Experiment& e, const std::vector<TimedAction>& told) {
-  std::vector<TimedAction> out = told;
-  std::int64_t duration = 0;
-  for (const TimedAction& action : interactionOf(e, duration).actions)
-    if (std::holds_alternative<Push>(action.action) &&
-        (told.empty() || action.start > told.back().start + 2 * e.controller.period))
-      out.push_back(action);
-  return out;
-}
-
 }  // namespace
 
 LiveRun::LiveRun(const std::string& url, const std::string& results)
@@ -82,7 +71,6 @@ bool LiveRun::follow(const state_t& state) {
   scene_.reset();
   curves_.reset();
   base_.reset();
-  let_go_.reset();
   stop_.reset();
   vehicle_.reset();
   instants_.clear();
@@ -93,7 +81,6 @@ bool LiveRun::follow(const state_t& state) {
 
 void LiveRun::takeState(const state_t& state) {
   if (!follow(state)) return;
-  followBase(state);
   state_ = state;
   heard_ = monotonicNow();
   describe();
@@ -103,11 +90,7 @@ void LiveRun::takeState(const state_t& state) {
   const auto row = rows_.add(state);
   if (!row || !scene_) return;
   row_ = *row;
-  if (let_go_ && let_go_->pushes.add(*row)) {
-    let_go_->computed = false;
-    // It is in the laboratory's axes, and the base would take it in its own.
-    let_go_->changed |= experiment_ && experiment_->controller.moving_frame.enabled;
-  }
+  base_->add(*row);
   // Who joins late has the same time.
   row_->t = static_cast<double>(row_->state.header.sequence * experiment_->controller.period) *
             kSecondPerNanosecond;
@@ -127,6 +110,7 @@ void LiveRun::describe() {
     experiment_ = parseExperiment(described_->resolved, channel::kExperiment);
     scene_.emplace(*experiment_);
     curves_.emplace(*experiment_);
+    base_.emplace(*experiment_);
   } catch (const InputError& error) {
     if (!std::exchange(warned_, true)) fmt::print(stderr, "ves view: {}\n", error.what());
     experiment_.reset();
@@ -152,30 +136,6 @@ void LiveRun::describe() {
   text["columns"].push_back({{"name", "real_time_factor"}, {"meaning", "of the last second"}});
   text["width"] = scene_->width() + 5 + curves_->size() + 1;
   scene_text_ = text.dump();
-}
-
-/// The base in free space is let go where the platform is; state_ is still the one before. That
-/// takes a while to compute, and who joins later does not know where it was.
-void LiveRun::followBase(const state_t& state) {
-  const auto runs = [](const state_t& s) { return s.segment >= 0 && inAdmittance(s); };
-  if (state_ && !let_go_ && runs(state) && !runs(*state_))
-    let_go_ = LetGo{state.header.sequence, Vec6::Map(state.x_desired), false};
-  if (let_go_ && !let_go_->computed && !let_go_->changed && experiment_ && !computing_.valid()) {
-    let_go_->computed = true;
-    computing_ = std::async(std::launch::async,
-                            [e = *experiment_, x = let_go_->x, told = let_go_->pushes.list()] {
-                              ReferenceMotions references;
-                              const std::vector<TimedAction> pushes = allPushes(e, told);
-                              return baseMotion(e, x, references, &pushes);
-                            });
-  }
-  if (computing_.valid() &&
-      computing_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) {
-    const auto base = computing_.get();
-    if (let_go_ && let_go_->computed) base_ = base;
-  }
-  if (let_go_ && (!ofConfiguredVehicle(state) || firesByOrder(state))) let_go_->changed = true;
-  if (let_go_ && let_go_->changed) base_.reset();
 }
 
 void LiveRun::measureRate(const state_t& state) {
@@ -252,9 +212,7 @@ void LiveRun::take(const PageMessage& message) {
 
 void LiveRun::keepPicture() {
   constexpr std::size_t kKept = 6000;  // [-] a minute at 100 Hz
-  std::optional<Vec6> base;
-  if (base_) base = base_->point(row_->state.header.sequence - let_go_->tick);
-  if (base) base = shownAt(row_->state, *base);
+  const std::optional<Vec6> base = base_->at(row_->state);
   Picture one{newest_, row_->state.header.time_ns, rate_, scene_->picture(*row_, base)};
   // 0: nothing asked, 1: not answered yet, 2: answered, and how, 3: no answer came
   const auto tell = [&](const std::optional<Asked>& asked) {

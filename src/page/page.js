@@ -56,6 +56,8 @@ function show(i) {
     lines.push(`the laboratory flies along: ${first.scalar(shown, 'flown').toFixed(2)} m from its start, turning at ${first.scalar(shown, 'turns_at').toFixed(1)} deg/s`);
   const couples = ['x', 'y', 'z'].filter((_, k) => first.scalar(shown, 'thrusters_on') >> COUPLES + k & 1);
   if (couples.length) lines.push(`couples about ${couples.join(', ')} hold the attitude`);
+  if (bodies[0].wheels.length)
+    lines.push(`wheels have taken ${bodies[0].wheels.map((_, k) => first.scalar(shown, `wheel${k}_momentum`).toFixed(2)).join(', ')} N m s`);
   const arrows = Object.keys(ARROWS).filter(name => bodies[0].arrows[name].visible);
   if (arrows.length) lines.push(`${arrows.join(', ')}: 1 m is ${newtonsPerMetre < 10 ? newtonsPerMetre.toFixed(1) : Math.round(newtonsPerMetre)} N`);
   if (how.times > 1) lines.push(`every motion times ${how.times}`);

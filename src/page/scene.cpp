@@ -11,6 +11,7 @@
 #include "ves/control/safety_checks.hpp"
 #include "ves/core/coordinates.hpp"
 #include "ves/core/errors.hpp"
+#include "ves/evaluation/let_go.hpp"
 #include "ves/math/dense.hpp"
 #include "ves/page/curves.hpp"
 #include "ves/page/page.hpp"
@@ -170,7 +171,7 @@ Scene::Scene(const Experiment& e)
     addPush(fmt::format("push_f{}", coordinate(i).name),
             [i](const truth_t& m) { return m.push_force[i]; });
   }
-  addThrusters(propulsionOf(e.controller.vehicle));
+  addPropulsion(e.controller.vehicle);
   description_["emulates"] = wantsAdmittance(program);
   description_["floats"] = std::holds_alternative<FreeBodyModel>(e.controller.vehicle.kind);
   description_["simulated"] = e.machine.simulated();
@@ -194,9 +195,11 @@ Scene::Scene(const Experiment& e)
   description_["checks"] = checks;
 }
 
-/// Each where it is, from the platform, and its force; and which are on.
-void Scene::addThrusters(const Propulsion& propulsion) {
-  description_["thrusters"] = Json::array();
+/// Thrusters where they are, from the platform, their forces, and which are on; wheels, which have
+/// no place, about the vehicle's centre, and what they have taken.
+void Scene::addPropulsion(const VehicleModel& vehicle) {
+  const Propulsion propulsion = propulsionOf(vehicle);
+  description_["thrusters"] = description_["wheels"] = Json::array();
   if (!propulsion.any()) return;
   for (int i = 0; i < propulsion.size; ++i) {
     const Thruster& one = propulsion.thrusters[static_cast<std::size_t>(i)];
@@ -204,6 +207,19 @@ void Scene::addThrusters(const Propulsion& propulsion) {
   }
   scalars_.push_back(
       {"thrusters_on", [](const Row& r) { return static_cast<double>(r.state.thrusters_on); }});
+  for (int i = 0; i < propulsion.wheel_count; ++i) {
+    const ReactionWheel wheel = propulsion.wheels[static_cast<std::size_t>(i)];
+    double most = 0.0;
+    for (int k = 0; k < wheel.size; ++k)
+      most = std::max(
+          most, std::abs(wheel.momentum(wheel.torques[static_cast<std::size_t>(k)].on.until)));
+    description_["wheels"].push_back(
+        {{"at", json(std::get<FreeBodyModel>(vehicle.kind).body_P.p_BoBcm_B)},
+         {"axis", json(wheel.axis_P)},
+         {"most", most}});
+    scalars_.push_back({fmt::format("wheel{}_momentum", i),
+                        [wheel](const Row& r) { return wheel.momentum(r.state.vehicle_time); }});
+  }
 }
 
 /// The frame in which the vehicle is emulated, as the laboratory flies through it; and its axes

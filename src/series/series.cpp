@@ -333,6 +333,14 @@ std::vector<Column> columns(const Experiment& experiment) {
           [=](const Row& r) { return Eigen::Quaterniond(emulatedPose(r.state).R).coeffs()(i); },
           "the same: its attitude, a quaternion");
   }
+  const Propulsion propulsion = propulsionOf(experiment.controller.vehicle);
+  for (int i = 0; i < propulsion.wheel_count; ++i)
+    add(
+        fmt::format("wheel{}_nms", i),
+        [wheel = propulsion.wheels[static_cast<std::size_t>(i)]](const Row& r) {
+          return wheel.momentum(r.state.vehicle_time);
+        },
+        "momentum that this reaction wheel has taken, about its axis");
   for (int i = 0; i < 6; ++i)
     add(
         fmt::format("{}_actual_{}", coordinate(i).name, coordinate(i).unit),

@@ -13,7 +13,7 @@
 #include <set>
 
 #include "ves/core/coordinates.hpp"
-#include "ves/evaluation/comparison.hpp"
+#include "ves/evaluation/let_go.hpp"
 #include "ves/evaluation/summary.hpp"
 #include "ves/validation/chapter4.hpp"
 #include "ves/validation/claims.hpp"

@@ -25,7 +25,7 @@
 #include "support/misbelief.hpp"
 #include "support/rig.hpp"
 #include "ves/analysis/gate.hpp"
-#include "ves/evaluation/comparison.hpp"
+#include "ves/evaluation/let_go.hpp"
 #include "ves/run/truth.hpp"
 
 namespace ves {

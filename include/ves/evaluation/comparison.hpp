@@ -3,13 +3,10 @@
 // The platform's motion in an admittance segment beside SRMS-robot's (section 4.3).
 #pragma once
 
-#include <atomic>
 #include <map>
-#include <memory>
 #include <optional>
 #include <vector>
 
-#include "ves/core/memo.hpp"
 #include "ves/series/series.hpp"
 #include "ves/srms/interaction.hpp"
 
@@ -59,72 +56,6 @@ struct Emulation {
   Motion base;      // the robot on its base in free space (SRMS-robot, nothing left out)
   Motion platform;  // in the first admittance segment
 };
-
-/// Where a platform that is emulated to be at x in E at the state's tick is shown; without a
-/// laboratory that flies at x.
-Vec6 shownAt(const state_t& state, const Vec6& x) noexcept;
-
-/// The base's motions that were needed last, for several threads. Runs that differ in noise, gains
-/// or filters share one: it depends on nothing but what is compared here.
-class ReferenceMotions {
- public:
-  /// SRMS-robot with nothing left out. None where the motion grows without bound.
-  std::shared_ptr<const std::optional<Motion>> of(const Interaction& interaction, std::int64_t step,
-                                                  std::int64_t duration);
-  int computed() const { return computed_; }  // [-]
-
- private:
-  static constexpr std::size_t kKept = 32;
-  struct Asked {
-    Interaction interaction;
-    std::int64_t step, duration;  // [ns]
-
-    bool operator==(const Asked&) const = default;
-  };
-  Memo<Asked, std::optional<Motion>, kKept> known_;
-  std::atomic<int> computed_ = 0;
-};
-
-/// The robot on its base in free space, in the first admittance segment of the program, let go at
-/// `start` from home: a point a tick. None without admittance control, and where the motion grows
-/// without bound. `pushes` that there were take the place of the program's; `firings` are those by
-/// orders.
-std::optional<Motion> baseMotion(const Experiment& experiment, const Vec6& start,
-                                 ReferenceMotions& references,
-                                 const std::vector<TimedAction>* pushes = nullptr,
-                                 const std::vector<OrderedFiring>& firings = {});
-
-/// Pushes on the machine in the first admittance segment, the program's and others, since it began.
-class ToldPushes {
- public:
-  /// The next row; true when it tells of another push.
-  bool add(const Row& row);
-  const std::vector<TimedAction>& list() const { return list_; }
-
- private:
-  std::optional<std::int64_t> start_;  // [ns] by the machine's clock
-  int seen_ = 0;
-  std::vector<TimedAction> list_;
-};
-std::vector<TimedAction> pushesOf(const Series& series);
-
-/// What the vehicle's thrusters were ordered to fire in the first admittance segment, since it was
-/// let go.
-std::vector<OrderedFiring> firingsOf(const Series& series);
-/// Whether an order has a thruster on.
-bool firesByOrder(const state_t& state) noexcept;
-
-/// Whether the vehicle is the configuration's, which an order may have changed.
-bool ofConfiguredVehicle(const state_t& state) noexcept;
-
-/// What keeps a run with admittance control from being compared with its base in free space; empty
-/// when nothing does, or there was none.
-std::string whyNotCompared(const Series& series);
-
-/// The same from where the platform was let go, beside what it did. None of a run without two ticks
-/// of it, or with another vehicle for a while.
-std::optional<Emulation> emulation(const Series& series, ReferenceMotions& references);
-std::optional<Emulation> emulation(const Series& series);
 
 /// [m], [rad] how far a base goes from where it would rest.
 struct Amplitude {

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "ves/evaluation/comparison.hpp"
+#include "ves/evaluation/let_go.hpp"
 #include "ves/run/run.hpp"
 
 namespace ves {

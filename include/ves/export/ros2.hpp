@@ -4,10 +4,12 @@
 // inside. ROS 2 itself is not needed, here or there.
 #pragma once
 
+#include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
-#include "ves/evaluation/comparison.hpp"
+#include "ves/series/series.hpp"
 
 namespace ves {
 
@@ -17,8 +19,12 @@ namespace ves {
 /// events.
 class McapExport {
  public:
+  /// [m, rad] from home: where the base in free space is shown beside a row. Nothing: not known.
+  using BaseOf = std::function<std::optional<Vec6>(const Row&)>;
+
   /// Throws InputError when the file cannot be written; so do add() and finish().
-  McapExport(const Experiment& experiment, const std::string& version, const std::string& file);
+  McapExport(const Experiment& experiment, const std::string& version, const std::string& file,
+             BaseOf base);
   ~McapExport();
 
   /// What a log or a bus says next. Ticks of the first controller only.

@@ -7,11 +7,11 @@
 
 #include <cmath>
 #include <deque>
-#include <future>
 #include <optional>
 #include <string>
 
 #include "ves/bus/bus.hpp"
+#include "ves/evaluation/let_go.hpp"
 #include "ves/page/curves.hpp"
 #include "ves/page/scene.hpp"
 #include "ves/page/web_server.hpp"
@@ -43,7 +43,6 @@ class LiveRun : public LiveSource {
   void takeExperiment(const experiment_t& experiment);
   void describe();
   bool follow(const state_t& state);
-  void followBase(const state_t& state);
   void measureRate(const state_t& state);
   void keepPicture();
   void remind();
@@ -72,20 +71,10 @@ class LiveRun : public LiveSource {
   std::optional<Experiment> experiment_;
   std::optional<Scene> scene_;
   std::optional<Curves> curves_;
+  std::optional<FollowedBase> base_;  // in free space
   std::string scene_text_;
   std::int64_t edition_ = 0;
   std::int64_t asked_ = 0;  // [ns]
-
-  std::future<std::optional<Motion>> computing_;
-  std::optional<Motion> base_;
-  struct LetGo {
-    std::int64_t tick;
-    Vec6 x;  // [m, rad] from home
-    bool computed;
-    bool changed = false;  // the vehicle is another one than the configuration's, or was
-    ToldPushes pushes = {};
-  };
-  std::optional<LetGo> let_go_;
 
   struct Instant {
     std::int64_t tick, wall;  // [-], [ns]

@@ -46,7 +46,7 @@ class Scene {
                nlohmann::ordered_json shape);
   void addArm();
   void addEmulated();
-  void addThrusters(const Propulsion& propulsion);
+  void addPropulsion(const VehicleModel& vehicle);
   Vec3 compass() const;
   void addWorld(const Environment& environment);
   /// A large platform's robot and sensor are no larger.
