@@ -183,15 +183,15 @@ BENCHMARK(SafetyChecks);
 
 // Whole
 
-const std::vector<std::string>& caseOf(const std::string& name) {
+const test::TickCase& caseOf(const std::string& name) {
   for (const test::TickCase& one : test::tickCases())
-    if (one.name == name) return one.set;
+    if (one.name == name) return one;
   throw std::logic_error(name);
 }
 
 /// Inputs of a closed loop, again and again from the same state.
-void tick(benchmark::State& state, const std::vector<std::string>& set) {
-  UnderWay run(set);
+void tick(benchmark::State& state, const test::TickCase& one) {
+  UnderWay run(one.set, one.scenario);
   const TestPlatform before = run.platform;
   std::vector<TickInput> inputs;
   while (inputs.size() < 500) {
@@ -242,7 +242,9 @@ void tail(benchmark::State& state, const std::vector<std::string>& set) {
   state.counters["p999_over_median"] = at(0.999) / at(0.5);
 }
 void ControllerTickTail(benchmark::State& state) { tail(state, {}); }
-void ControllerTickTailCompensated(benchmark::State& state) { tail(state, caseOf("compensated")); }
+void ControllerTickTailCompensated(benchmark::State& state) {
+  tail(state, caseOf("compensated").set);
+}
 BENCHMARK(ControllerTickTail)->Iterations(20)->Unit(benchmark::kMillisecond);
 BENCHMARK(ControllerTickTailCompensated)->Iterations(20)->Unit(benchmark::kMillisecond);
 

@@ -12,15 +12,16 @@
 
 namespace ves::test {
 
-/// PUMA on six modes, seven seconds after the start: it is emulated.
+/// Seven seconds after the start: a PUMA on six modes, or a scenario's vehicle, is emulated.
 struct UnderWay {
   Experiment e;
   TestPlatform platform{e.controller};
   plant::Plant plant{e.plant};
   TickInput in, used;
 
-  explicit UnderWay(const std::vector<std::string>& set = {})
-      : e(experiment("puma_on_table_4_1", set)) {
+  explicit UnderWay(const std::vector<std::string>& set = {},
+                    const std::string& scenario = "puma_on_table_4_1")
+      : e(experiment(scenario, set)) {
     in.order.request = Request::kStart;
     while (in.tick < 700) step();
   }
@@ -37,6 +38,7 @@ struct UnderWay {
 struct TickCase {
   std::string name;
   std::vector<std::string> set;
+  std::string scenario = "puma_on_table_4_1";
 };
 inline const std::vector<TickCase>& tickCases() {
   static const std::vector<TickCase> cases = [] {
@@ -46,13 +48,17 @@ inline const std::vector<TickCase>& tickCases() {
           "controller.compensation.feed_forward=true", "controller.compensation.observer=true",
           "controller.compensation.inertia=true", "sensor.readings_per_tick=4"};
       set.insert(set.end(), more.begin(), more.end());
-      all.push_back({name, set});
+      all.push_back({name, set, "puma_on_table_4_1"});
     };
     add("compensated", {});
     add("adaptation_aided",
         {"controller.compensation.adaptation=true", "controller.compensation.wrench=aided"});
     add("learning_masses",
         {"controller.compensation.wrench=aided", "controller.compensation.learns_masses=true"});
+    // A body that floats, beside modes under the same conditions.
+    add("aided_in_space", {"controller.compensation.wrench=aided", "gravity_m_per_s2=0"});
+    all.push_back({"floating", {}, "satellite_puma"});
+    all.push_back({"in_flight", {}, "satellite_tumbling"});
     return all;
   }();
   return cases;

@@ -19,7 +19,7 @@ __attribute__((noinline)) void countedTick(TestPlatform& platform, const TickInp
 int run(const std::string& name, int times) {
   for (const test::TickCase& one : test::tickCases()) {
     if (one.name != name) continue;
-    test::UnderWay run(one.set);
+    test::UnderWay run(one.set, one.scenario);
     const TestPlatform before = run.platform;
     std::vector<TickInput> inputs;
     while (inputs.size() < 500) {
