@@ -97,7 +97,8 @@ int accept(RunnerOptions& options, Wanted& wanted) {
     seconds += result.simulated;
     found.push_back(measurementsOf(readSeries(launch.process.log), test));
     if (!result.good()) {
-      stopped = fmt::format("{}: {}", coordinate(test.coordinate).name, whyNot(result));
+      stopped = fmt::format("{}: {}", coordinate(test.coordinate).name,
+                            whyNot(result, launch.process.log));
       break;
     }
   }

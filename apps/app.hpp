@@ -25,6 +25,7 @@
 #include "ves/config/experiment.hpp"
 #include "ves/core/build.hpp"
 #include "ves/core/spelling.hpp"
+#include "ves/evaluation/evidence.hpp"
 #include "ves/run/run.hpp"
 #include "ves/series/series.hpp"
 
@@ -235,8 +236,8 @@ inline void printWords(const CLI::App& cli) {
     for (const std::string& name : option->get_lnames()) std::cout << "--" << name << " ";
 }
 
-/// Why a run of the controller is no success: "not armed: ..." or "stopped by ..."; else empty.
-inline std::string whyNot(const RunResult& result) {
+/// Why a run of the controller is no success, empty where it is; its log knows more of it.
+inline std::string whyNot(const RunResult& result, const std::string& log = "") {
   if (result.phase == Phase::kDisarmed)
     return fmt::format(
         "not armed: {}{}",
@@ -244,7 +245,10 @@ inline std::string whyNot(const RunResult& result) {
         result.rejected.empty() ? "" : "; " + result.rejected);
   if (result.phase == Phase::kStopped)
     return fmt::format("stopped by the {} check in tick {}", name(result.cause), result.cause_tick);
-  return {};
+  if (!result.aborted) return {};
+  if (!log.empty()) return whyEarly(readSeries(log));
+  return result.aborted_by == Refusal::kNone ? "the calibration was refused"
+                                             : refusedSegment(result.aborted_by);
 }
 
 /// Throws InputError, naming the option, when it cannot be written.

@@ -28,7 +28,8 @@ int commission(RunnerOptions& options, const CommissioningOptions& wanted) {
   const RunResult result = execute(options, c.experiment, launch);
   writeResults(folder, result, false);
   if (!result.good()) {
-    fmt::print(stderr, "ves commission: {}; nothing is believed of it\n", whyNot(result));
+    fmt::print(stderr, "ves commission: {}; nothing is believed of it\n",
+               whyNot(result, launch.process.log));
     return kTripped;
   }
 

@@ -173,7 +173,7 @@ inline int runExperiment(RunnerOptions& options) {
   if (!options.quiet)
     fmt::print("{}", table);
   else if (!result.good())
-    fmt::print(stderr, "ves run: {}\n", whyNot(result));
+    fmt::print(stderr, "ves run: {}\n", whyNot(result, launch.process.log));
   return statusOf(result);
 }
 

@@ -143,6 +143,28 @@ TEST_F(Commission, WithoutWeightFindsTheServosAlone) {
               5.0 * found.servo->legs.deviation.tau(0));
 }
 
+// A program that went home early says why, whoever ran it.
+TEST_F(Commission, SaysWhyItEndedEarly) {
+  const std::string shaky = "--lockstep --set controller.still.deviation_counts=1e-3 ";
+  const test::Output o =
+      test::sh(app("commission") + "puma_on_table_4_1 " + shaky + "--quiet" + out("c"));
+  EXPECT_EQ(o.status, 1);
+  EXPECT_EQ(o.text.rfind("ves commission: the calibration was refused: ", 0), 0u) << o.text;
+  EXPECT_NE(o.text.find("controller.still.deviation_counts"), std::string::npos) << o.text;
+  EXPECT_EQ(std::count(o.text.begin(), o.text.end(), '\n'), 1) << o.text;
+
+  const test::Output calibration = run("puma_on_table_4_1 --no-plots --quiet " + shaky + out("r"));
+  EXPECT_EQ(calibration.text.rfind("ves run: the calibration was refused: ", 0), 0u)
+      << calibration.text;
+  const test::Output segment =
+      run("satellite_puma --no-plots --quiet --lockstep --set 'program=[{admittance: {duration_s: "
+          "1}}]'" +
+          out("s"));
+  EXPECT_EQ(segment.status, 1);
+  EXPECT_EQ(segment.text.rfind("ves run: a segment of the program was refused: ", 0), 0u)
+      << segment.text;
+}
+
 TEST_F(Commission, LeavesAPageAndABeliefThatRunTakes) {
   const test::Output o =
       test::sh(app("commission") + "puma_on_table_4_1 --lockstep --seed 4" + out("c"));

@@ -139,29 +139,36 @@ std::string stillnessViolation(const state_t& s, const Experiment& experiment) {
   const std::string channel(i < 6 ? kWrenchComponents[i].name : "a channel");
   switch (static_cast<StillnessViolation>(s.violation)) {
     case StillnessViolation::kLeg:
-      return fmt::format("leg {} moved by {} counts ({} allowed)", i + 1, s.violation_amount,
-                         limits.leg_counts);
+      return fmt::format("leg {} moved by {} counts ({} allowed: controller.still.leg_counts)",
+                         i + 1, s.violation_amount, limits.leg_counts);
     case StillnessViolation::kJoint: {
       const bool known = i < experiment.robot.joint_names.size();
       const bool turns =
           known && experiment.controller.payload.robot.jointLink(s.violation_index).type ==
                        JointType::kRevolute;
-      return fmt::format("{} moved by {:.4f} {} ({} allowed)",
+      return fmt::format("{} moved by {:.4f} {} ({} allowed: controller.still.joint_rad_or_m)",
                          known ? experiment.robot.joint_names[i] : fmt::format("joint {}", i + 1),
                          s.violation_amount, turns ? "rad" : "m", limits.joint);
     }
     case StillnessViolation::kChannel:
-      return fmt::format("{} scatters by {:.1f} counts ({} allowed): something shakes it", channel,
-                         s.violation_amount, limits.deviation);
+      return fmt::format(
+          "{} scatters by {:.1f} counts ({} allowed: controller.still.deviation_counts): something "
+          "shakes it",
+          channel, s.violation_amount, limits.deviation);
     case StillnessViolation::kBias:
       return fmt::format(
-          "{} would have a bias of {:.0f} counts ({:.0f} allowed): it carries a load that is not "
+          "{} would have a bias of {:.0f} counts ({:.0f} allowed: controller.still.bias_v): it "
+          "carries a load that is not "
           "in the model, or less than that",
           channel, s.violation_amount, limits.bias);
     case StillnessViolation::kNone:
     case StillnessViolation::kCount: break;
   }
   return "no stream of new samples";
+}
+
+std::string refusedSegment(Refusal why) {
+  return fmt::format("a segment of the program was refused: {}", name(why));
 }
 
 std::string whyEarly(const Series& series) {
@@ -178,9 +185,7 @@ std::string whyEarly(const Series& series) {
                                   [](const Row& row) { return row.state.aborted != 0; });
   if (first == series.rows.end()) return {};
   const state_t& s = first->state;
-  if (s.aborted_by != 0)
-    return fmt::format("a segment of the program was refused: {}",
-                       name(static_cast<Refusal>(s.aborted_by)));
+  if (s.aborted_by != 0) return refusedSegment(static_cast<Refusal>(s.aborted_by));
   return fmt::format("the calibration was refused: {}", stillnessViolation(s, series.experiment));
 }
 

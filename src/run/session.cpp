@@ -85,6 +85,7 @@ void Session::receive(const std::string& channel, const void* data, std::uint32_
                       : static_cast<Check>(state->cause);
   result_.cause_tick = state->cause_tick;
   result_.aborted = state->aborted != 0;
+  result_.aborted_by = static_cast<Refusal>(state->aborted_by);
   if (on_state_) on_state_(*state);
 }
 

@@ -18,5 +18,6 @@ std::string stillnessViolation(const state_t& state, const Experiment& experimen
 
 /// Why a program went home early; empty when it did not.
 std::string whyEarly(const Series& series);
+std::string refusedSegment(Refusal why);
 
 }  // namespace ves

@@ -21,7 +21,8 @@ struct RunResult {
   Phase phase = Phase::kDisarmed;
   Check cause = Check::kCount;  // of a stop; or why it never armed
   std::int64_t cause_tick = -1;
-  bool aborted = false;        // the program could not go on: a calibration or a start was refused
+  bool aborted = false;  // the program could not go on: a calibration or a start was refused
+  Refusal aborted_by = Refusal::kNone;  // why, of a start
   bool let_go = false;         // asked to end before it was armed, or after a stop was reset
   std::int64_t lost = 0;       // [-] messages that could not be sent, or were not heard
   std::int64_t log_lost = 0;   // [-] events that could not be written

@@ -24,6 +24,7 @@ class RunMonitor {
     last_tick_ = state.tick;
     result_.phase = state.phase;
     result_.aborted = state.aborted;
+    result_.aborted_by = state.aborted_by;
     const bool stop = request == Request::kStop;
     if (request == Request::kHold) attended_ = true;
     switch (state.phase) {
