@@ -15,8 +15,8 @@
 #include "ves/analysis/gate.hpp"
 #include "ves/config/servo.hpp"
 #include "ves/control/gravity_compensation.hpp"
-#include "ves/evaluation/let_go.hpp"
 #include "ves/evaluation/identified.hpp"
+#include "ves/evaluation/let_go.hpp"
 #include "ves/identification/sensor_timing.hpp"
 #include "ves/identification/servo_identification.hpp"
 #include "ves/math/dense.hpp"
@@ -488,6 +488,60 @@ TEST_F(Emulation, WhatIsLearntLeavesAFloatingBaseNoMomentum) {
   EXPECT_GT(fastest, 5e-3);                             // [m/s]
   EXPECT_LT(base.x_dot.back().head<3>().norm(), 2e-5);  // [m/s]
   EXPECT_LT(base.x_dot.back().tail<3>().norm(), 2e-5);  // [rad/s]
+}
+
+// Legs that move fast are further off, by what an update of their LegSlaves counts for; on a body
+// that floats what passes for a touch would stay for good.
+TEST_F(Emulation, LegsThatMoveFastAreNoTouch) {
+  for (const double mass : {300.0, 1000.0})
+    for (const bool noise : {true, false}) {
+      const Series series = run(experiment(
+          "satellite_puma",
+          {fmt::format("robot=!replace {{from: {}/robots/doss.yaml}}", VES_TEST_CONFIG_DIR),
+           fmt::format("sensor.noise={}", noise),
+           fmt::format("base.free={{mass_kg: {}, inertia_kg_m2: [{}, {}, {}, 0, 0, 0]}}", mass,
+                       mass / 6, mass / 6, mass / 6),
+           "program=[{move: {}}, {calibration: {}}, {admittance: {duration_s: 20}, robot: [{at_s: "
+           "1, duration_s: 2, joint: joint_1, to_deg_or_m: 40}, {at_s: 5, duration_s: 2, joint: "
+           "joint_2, to_deg_or_m: -30}, {at_s: 9, duration_s: 2, joint: joint_1, to_deg_or_m: "
+           "0}]}]"}));
+      ASSERT_TRUE(result_.good());
+      double fastest = 0.0;
+      eachTick(series, [&](const Row& row, double) {
+        EXPECT_TRUE(row.state.withholds) << row.t;
+        for (const double v : row.state.leg_dot) fastest = std::max(fastest, std::abs(v));
+      });
+      EXPECT_GT(fastest, 0.03);  // [m/s]
+      const auto both = emulation(series);
+      ASSERT_TRUE(both);
+      EXPECT_LT(distance(both->platform, both->base).rms_position,
+                0.01 * travel(both->base).peak_position);
+    }
+}
+
+// A grasp between two runs of the program, told by the gripper's switch alone.
+TEST_F(Emulation, ALoadThatWasTakenWhileDisarmedIsLearnt) {
+  const Experiment e = experiment(
+      "puma_on_table_4_1", with(kCompensated, kAidedWrench),
+      with({"controller.compensation.learns_masses=true", "robot.gripper_switch=true"}, kMean));
+  Rig rig(e);
+  rig.arm();
+  rig.order(Request::kRun, test::segment(SegmentKind::kCalibration));
+  rig.until(Phase::kArmed);
+  rig.run(20);
+  rig.disturb([](Sample& s) { s.switches &= ~kPanicButtonClosed; });
+  ASSERT_EQ(rig.run(2).phase, Phase::kStopped);
+  rig.disturb(nullptr);
+  rig.run(5);
+  rig.tick(Request::kReset);
+  ASSERT_EQ(rig.tick().phase, Phase::kDisarmed);
+  const RigidBody load{2.0, Vec3(0.0, 0.0, 0.05), 0.002 * Mat3::Identity()};
+  ASSERT_TRUE(rig.plant().moveRobot(Grasp{e.plant.payload.robot.size - 1, load}));
+  rig.run(10);
+  rig.arm();
+  rig.order(Request::kRun, test::segment(SegmentKind::kAdmittance, 10.0));
+  rig.run(300);
+  EXPECT_LT(rig.state().motion.x.head<3>().norm(), 2e-3);
 }
 
 TEST_F(Emulation, WhatIsLearntGoesByTheTimesThatTheMachineEchoes) {

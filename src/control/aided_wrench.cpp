@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "ves/math/dense.hpp"
 #include "ves/robot/momentum.hpp"
@@ -81,7 +82,7 @@ AidedWrench::AidedWrench(const ControllerConfig& config)
       geometry_(config.geometry),
       period_(config.periodSeconds()),
       rounding_(config.servo.readings.scale.maxCoeff() / std::sqrt(12.0)),
-      speed_of_count_(steepest(config.servo).cwiseProduct(config.servo.readings.scale)),
+      servo_(config.servo),
       joint_speed_(JointParabola(config).speed * config.joints.deviation),
       X_SP_(inverse(config.sensor.X_PS)),
       S_proc_(inverse(config.sensor.C_proc)),
@@ -115,6 +116,7 @@ Wrench AidedWrench::update(const Input& in, bool engaged) noexcept {
   lesson_.hand = -1;
   lesson_.was_weight = false;
   if (!aided_) return in.measured;
+  hand_moved_ = hand_moved_ || in.gripper;  // also where nothing is learnt yet
   if (!engaged) {
     restart();
     settled_ = false;
@@ -127,10 +129,12 @@ Wrench AidedWrench::update(const Input& in, bool engaged) noexcept {
   reaction_ = in.joints.force();
   calibrate(in);
   if (!begun_) return in.measured;
-  if (in.gripper && regressor_.hand() >= 0) doubtHand(countsPerWrench(in.X_IP.R));
+  if (std::exchange(hand_moved_, false) && regressor_.hand() >= 0)
+    doubtHand(countsPerWrench(in.X_IP.R));
   if (in.samples.fresh()) {
     constexpr std::int64_t kRefresh = 100;  // [-] samples: attitude and joints change slowly
     if (residuals_++ % kRefresh == 0) refreshNoise(in);
+    refreshLegs(in.robot.platform());
     const Wrench residual = in.measured - in.joints.shown(in.robot.platform().w);
     take(in, countsPerWrench(in.X_IP.R), residual);
   }
@@ -348,7 +352,7 @@ void AidedWrench::refreshNoise(const Input& in) noexcept {
   noise_.sensor = in.bias.noise();
   noise_.sensor.correlation = std::max(noise_.sensor.correlation, least_correlation_);
   noise_.weight.setZero();
-  noise_.legs.setZero();
+  felt_of_legs_.setZero();
   noise_.joints = jointNoise(in);
   const Mat6& M_1 = in.robot.M_1();
   const double mass = M_1(0, 0);
@@ -356,7 +360,9 @@ void AidedWrench::refreshNoise(const Input& in) noexcept {
   const Vec3 p_PoBcm_I = Vec3(M_1(5, 1), M_1(3, 2), M_1(4, 0)) / mass;
   const Mat6 counts = countsPerWrench(in.X_IP.R);
   LegMotion one;
-  one.L = legLengths(geometry_, in.X_IP);
+  const LegLines lines = legLines(geometry_, in.X_IP);
+  one.L = lines.L;
+  rates_of_twist_ = lines.J;
   for (int i = 0; i < kLegs; ++i) {
     BodyMotion P;
     one.L_ddot = Vec6::Unit(i);
@@ -367,9 +373,19 @@ void AidedWrench::refreshNoise(const Input& in) noexcept {
       return (size * counts * wrench.stacked()).cwiseAbs2();
     };
     noise_.weight += squared(rounding_, {turned, p_PoBcm_I.cross(turned)});
-    noise_.legs += squared(speed_of_count_(i), Wrench::from(inertial));
+    felt_of_legs_.col(i) = counts * inertial;
   }
-  noise_.legs = noise_.legs.cwiseSqrt().eval();
+}
+
+/// A leg that moves takes what it is told sooner or later by up to an update of its LegSlave, and
+/// has gone so much farther.
+void AidedWrench::refreshLegs(const BodyMotion& P) noexcept {
+  constexpr double kKept = 1.0 - 1.0 / ResidualGate::kMeans.back();  // [-] of the speed of before
+  const Vec6 twist = (Vec6() << P.v, P.w).finished();
+  leg_speed_ = (rates_of_twist_ * twist).cwiseAbs().cwiseMax(kKept * leg_speed_);
+  const Vec6 off =
+      steepest(servo_).cwiseProduct(servo_.readings.scale + servo_.update * leg_speed_);
+  noise_.legs = (felt_of_legs_.cwiseAbs2() * off.cwiseAbs2()).cwiseSqrt();
 }
 
 }  // namespace ves

@@ -21,8 +21,9 @@ double largestFelt(const ServoModel& servo, double period, std::size_t samples);
 struct ResidualNoise {
   SensorNoise sensor;
   Vec6 weight = Vec6::Zero();  // [count^2] from the attitude by rounded lengths, turning the weight
-  Vec6 legs = Vec6::Zero();    // [count s] of a leg that takes its next count sooner or later than
-                               // modelled, and so goes K count quicker; per [1/s] of largestFelt()
+  Vec6 legs = Vec6::Zero();    // [count s] of a leg that takes its next count, or what it is told,
+                               // sooner or later than modelled, and so goes K times that quicker;
+                               // per [1/s] of largestFelt()
   Vec6 joints = Vec6::Zero();  // [count] of a sample from the joints' readings, which give their
                                // momentum; of a mean it is what both its ends are off by
 };
@@ -111,6 +112,7 @@ class AidedWrench {
   void use() noexcept;
   Mat6 countsPerWrench(const Mat3& R_IP) const noexcept;  // about Po in I
   void refreshNoise(const Input& in) noexcept;
+  void refreshLegs(const BodyMotion& P) noexcept;
   Vec6 jointNoise(const Input& in) const noexcept;  // [count]
   Vec6 momentumNoise() const noexcept;              // [count^2 s^2]
 
@@ -118,10 +120,13 @@ class AidedWrench {
   int hold_;  // [-] samples
   Vec3 gravity_;
   Geometry geometry_;
-  double period_;            // [s]
-  double rounding_;          // [m] of a leg, rms
-  Vec6 speed_of_count_;      // [m/s] K times a count
-  JointVector joint_speed_;  // [rad/s | m/s] rms, by readings of joints
+  double period_;    // [s]
+  double rounding_;  // [m] of a leg, rms
+  ServoModel servo_;
+  Mat6 felt_of_legs_ = Mat6::Zero();    // [count s^2/m] by a leg's acceleration,
+  Mat6 rates_of_twist_ = Mat6::Zero();  // [m/s] of the legs by the platform's; as noise_ was found
+  Vec6 leg_speed_ = Vec6::Zero();       // [m/s] of late
+  JointVector joint_speed_;             // [rad/s | m/s] rms, by readings of joints
   Transform X_SP_;
   Mat6 S_proc_;  // [count per N | N m]
   Transform X_PL0_;
@@ -143,6 +148,7 @@ class AidedWrench {
   MassVector used_;                      // the parameters that the model has
   Vec6 bias_ = Vec6::Zero();             // [count] that belief_ counts its bias from
   bool begun_ = false, taking_ = false;  // a calibration
+  bool hand_moved_ = false;              // and that has not been looked at
   bool taught_ = false;
 
   MassColumns weight_;    // of the newest sample, about Po in I
