@@ -141,6 +141,23 @@ TEST(Tare, MovesTheCommandedPoseByNothingWhenItIsApplied) {
   EXPECT_LT(tared.state().motion.x.norm(), 0.1 * twin.state().motion.x.norm() + 1e-3);
 }
 
+TEST(Tare, IsGivenUpWhereACalibrationBegins) {
+  for (const int ticks : {1, 60, 130}) {  // while it averages, and while the bias slides
+    const Experiment e = experiment("puma_on_table_4_1", {"sensor.noise=false"});
+    Rig rig(e), alone(e);
+    for (Rig* r : {&rig, &alone}) r->arm();
+    rig.tick(Request::kTare);
+    alone.tick();
+    for (Rig* r : {&rig, &alone}) {
+      r->run(ticks);
+      r->order(Request::kRun, segment(SegmentKind::kCalibration));
+    }
+    const Vec6 found = alone.until(Phase::kArmed).bias;
+    EXPECT_LT((rig.until(Phase::kArmed).bias - found).norm(), 1e-9) << ticks;
+    for (int i = 0; i < 300; ++i) ASSERT_LT((rig.tick().bias - found).norm(), 1e-9) << ticks;
+  }
+}
+
 TEST(Tare, ForgetsWhatAFaultHasToldIt) {
   Rig rig(experiment("puma_on_table_4_1"));
   rig.arm();

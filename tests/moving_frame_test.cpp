@@ -336,6 +336,34 @@ TEST(Flight, WhatFloatsIsWhereItWasForAnotherController) {
     for (std::size_t k = 0; k < first.size(); ++k)
       EXPECT_LT((beside()[k] - first[k]).norm(), 1e-11) << k;
   }
+  // Or the one before was still flying.
+  command.laboratory.E_H.v = Vec3(5.0, 0.0, 0.0);
+  plant.command(command);
+  command.laboratory.E_H = {};
+  plant.command(command);
+  for (std::size_t k = 0; k < 2; ++k) EXPECT_LT((beside()[k] - first[k]).norm(), 1e-7) << k;
+}
+
+TEST(Flight, ATripLeavesWhatFloatsWhereItWasBesideTheTool) {
+  const Experiment e = test::experiment(
+      "servicer_capture",
+      {"controller.moving_frame.enabled=true", "base.free.velocity_m_per_s=[5, 0, 0]",
+       "environment.target.velocity_m_per_s=[5, 0, 0]",
+       "environment.target.turning_deg_per_s=[0, 0, 0]",
+       "program=!replace [{move: {}}, {calibration: {}}, {admittance: {duration_s: 8}}]"});
+  Lockstep loop(e.controller, e.plant);
+  loop.step({Request::kStart, {}, {}});
+  const auto clearance = [&] { return loop.plant().truth().clearance; };
+  for (int i = 0; i < 400; ++i) loop.step();
+  const double before = clearance();
+  ASSERT_EQ(loop.state().kind, SegmentKind::kAdmittance);
+  ASSERT_GT(before, 0.01);
+  loop.disturb = [](Sample& s) { s.switches = 0; };
+  for (int i = 0; i < 20; ++i) {
+    loop.step();
+    EXPECT_NEAR(clearance(), before, 1e-3) << i;
+  }
+  EXPECT_EQ(loop.state().phase, Phase::kStopped);
 }
 
 TEST(Flight, TheLaboratoryRestsWhereNothingIsEmulated) {
@@ -397,13 +425,18 @@ TEST(Flight, APushOnWhatFloatsIsInTheLaboratory) {
   for (int i = 0; i < 600; ++i) loop.step();
   const Mat3 R_EI = loop.state().command.laboratory.E_H.X.R;
   ASSERT_GT(rotationVector(R_EI).norm(), 1.0);
-  const Vec3 before = loop.plant().truth().target.v;
-  constexpr double kForce = 10.0, kTime = 0.1;  // [N], [s]
-  ASSERT_TRUE(loop.plant().moveRobot(
-      Push{Push::On::kTarget, -1, Vec3::Zero(), kForce * Vec3::UnitX(), kTime}));
+  const Floating before = loop.plant().truth().target;
+  constexpr double kForce = 10.0, kTime = 0.1, kOff = 0.2;  // [N], [s], [m]
+  // Somewhat off the centre, along the force: it does not turn.
+  const Vec3 at = kOff * (before.q.conjugate() * R_EI.col(0));
+  ASSERT_TRUE(
+      loop.plant().moveRobot(Push{Push::On::kTarget, -1, at, kForce * Vec3::UnitX(), kTime}));
   for (int i = 0; i < 20; ++i) loop.step();
-  const double dv = kForce * kTime / e.plant.task.world->environment.target->mass;
-  EXPECT_LT((loop.plant().truth().target.v - before - dv * R_EI.col(0)).norm(), 0.05 * dv);
+  const Target& target = *e.plant.task.world->environment.target;
+  const Floating& after = loop.plant().truth().target;
+  const double dv = kForce * kTime / target.mass;
+  EXPECT_LT((after.v - before.v - dv * R_EI.col(0)).norm(), 0.05 * dv);
+  EXPECT_LT((after.w - before.w).norm(), 0.1 * kOff * kForce * kTime / target.I_Bcm_B(0, 0));
 }
 
 TEST(Flight, WhatIsFeltIsKnownAfterACalibration) {

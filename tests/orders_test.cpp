@@ -91,6 +91,75 @@ TEST(Orders, AreRefusedForAReason) {
   EXPECT_EQ(rig.state().phase, Phase::kStopped);
 }
 
+TEST(Orders, AHoldTakesArmingBack) {
+  Rig rig(experiment("z_sine"));
+  EXPECT_EQ(rig.tick(Request::kArm).refusal, Refusal::kNone);
+  ASSERT_EQ(rig.state().phase, Phase::kDisarmed);
+  EXPECT_EQ(rig.tick(Request::kHold).refusal, Refusal::kNone);
+  EXPECT_EQ(rig.run(100).phase, Phase::kDisarmed);
+  EXPECT_EQ(rig.tick(Request::kHold).refusal, Refusal::kNotArmed);
+}
+
+// A segment that was ordered and ends at rest, and one that goes on: nothing is emulated after it.
+TEST(Orders, ThrustersFireWhileTheVehicleIsEmulatedOnly) {
+  Order fire;
+  fire.request = Request::kThrust;
+  fire.thrust(1) = 0.5;
+  for (const bool moves : {false, true}) {
+    Rig rig(experiment("satellite_jets", {"base.free.rate_deg_per_s=[0, 0, 0]",
+                                          fmt::format("base.free.velocity_m_per_s=[{}, 0, 0]",
+                                                      moves ? 0.005 : 0.0)}));
+    rig.arm();
+    rig.order(Request::kRun, segment(SegmentKind::kCalibration));
+    rig.until(Phase::kArmed);
+    EXPECT_EQ(rig.give(fire).refusal, Refusal::kNotEmulated);
+    rig.order(Request::kRun, segment(SegmentKind::kAdmittance, 1.0));
+    for (int i = 0; i < 20; ++i) EXPECT_TRUE(rig.tick().thrust.left.isZero(0.0)) << i;  // no order
+    rig.until(Phase::kArmed);
+    EXPECT_EQ(rig.give(fire).refusal, Refusal::kNotEmulated) << moves;
+    rig.order(Request::kRun, segment(SegmentKind::kAdmittance, 1.0));
+    EXPECT_EQ(rig.give(fire).refusal, Refusal::kNone);
+    EXPECT_GT(rig.tick().thrust.left(1), 0.4);
+  }
+}
+
+// What is said of a vehicle is of one that is emulated.
+TEST(Orders, NothingIsSaidOfAVehicleThatIsGone) {
+  Rig rig(
+      experiment("satellite_puma",
+                 {"base.free.velocity_m_per_s=[0.05, 0, 0]",
+                  "program=[{move: {}}, {calibration: {}}, {admittance: {duration_s: 6.08}}]"}));
+  rig.tick(Request::kStart);
+  double least = 1.0;
+  bool after = false;
+  while (!test::done(rig.tick())) {
+    const TickState& s = rig.state();
+    if (s.kind == SegmentKind::kAdmittance) {
+      least = std::min(least, s.envelope_scale);
+    } else {
+      after = after || least < 1.0;
+      EXPECT_EQ(s.envelope_scale, 1.0) << s.tick;
+      EXPECT_EQ(s.passivity_damping, 0.0) << s.tick;
+    }
+  }
+  EXPECT_LT(least, 1.0);
+  EXPECT_TRUE(after);
+}
+
+// Also where what was commanded was meant for the tick to come.
+TEST(Orders, AFreezeHoldsWhatIsDesired) {
+  Rig rig(experiment("satellite_puma", {"base.free.velocity_m_per_s=[0.005, 0, 0]"}));
+  rig.arm();
+  rig.order(Request::kRun, segment(SegmentKind::kCalibration));
+  rig.until(Phase::kArmed);
+  rig.order(Request::kRun, segment(SegmentKind::kAdmittance, 10.0));
+  rig.run(100);
+  ASSERT_GT((rig.state().motion.x - rig.state().desired).norm(), 1e-5);
+  rig.disturb([](Sample& s) { s.switches = 0; });
+  EXPECT_EQ(rig.tick().phase, Phase::kStopped);
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(rig.tick().desired, rig.state().motion.x);
+}
+
 TEST(Orders, HoldBrakesAlongTheMotionAndStaysThere) {
   Rig rig(experiment("z_sine"));
   rig.arm();

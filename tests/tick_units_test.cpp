@@ -700,6 +700,32 @@ TEST(Rehearsal, LooksAtTheLastPoseWhateverTheStride) {
   EXPECT_EQ(rehearsal.failure(), Check::kMotionLimits);
 }
 
+// However long it lasts: poses that are a whole number of periods apart all look alike.
+TEST(Rehearsal, MissesNoSineThatLastsLong) {
+  const ControllerConfig& c = puma();
+  const PathChecks checks(c.safety, c.geometry);
+  const PathPoint<6> home = atRest(Vec6::Zero());
+  for (const double duration : {40.0, 400.0, 1000.0, 5000.0, 10000.0})
+    for (const double other : {0.05, 0.1, 0.0700001}) {  // [Hz] of its second coordinate
+      const auto failure = [&](double amplitude) {
+        Segment s = test::sine(2, amplitude, 0.05, duration);
+        s.trajectory.motion[0] = AxisMotion::kSine;
+        s.trajectory.amplitude(0) = amplitude;
+        s.trajectory.frequency(0) = other;
+        Rehearsal rehearsal;
+        rehearsal.begin(MotionPlan::of({c.periodSeconds(), c.gentle}, s, home),
+                        legLengths(c.geometry, c.geometry.fromHome({})));
+        for (int tick = 0; rehearsal.underWay(); ++tick) {
+          rehearsal.advance(checks, c.periodSeconds(), c.path);
+          EXPECT_LT(tick, 2 * Rehearsal::kPoses / Rehearsal::kPosesATick + 1);
+        }
+        return rehearsal.failure();
+      };
+      EXPECT_NE(failure(1.0005 * c.safety.translation), Check::kCount) << duration;
+      EXPECT_EQ(failure(0.3 * c.safety.translation), Check::kCount) << duration;
+    }
+}
+
 // Of one parameter and a bias, by hand: Bayes' rule for normal distributions.
 TEST(MassBelief, IsSharpenedAsNormalDistributionsAre) {
   constexpr double kOfMass = 0.5, kOfBias = 2.0, kNoise = 0.3, kSeen = 1.7;

@@ -237,6 +237,37 @@ Order vehicleOrder(const VehicleFactors& to, double over,
   return order;
 }
 
+// What is judged is where the vehicle goes, not where it is on the way there.
+TEST(VehicleOrder, IsJudgedBesideWhatWasOrderedBefore) {
+  const Experiment e = test::unassessed("puma_on_table_4_1");
+  const VehicleFactors to{0.05, 0.1, 50.0};
+  const auto ordered = [](const VehicleFactors& factors) {
+    Order order;
+    order.request = Request::kVehicle;
+    order.vehicle = {factors, 1000.0};
+    return order;
+  };
+  TickState state;
+  EXPECT_EQ(judged(ordered(to), e, state).verdict.uncompensated, Stability::kUnstable);
+
+  Rig rig(test::experiment("puma_on_table_4_1"));
+  rig.arm();
+  rig.order(Request::kRun, test::segment(SegmentKind::kCalibration));
+  rig.until(Phase::kArmed);
+  rig.order(Request::kRun, test::segment(SegmentKind::kAdmittance, 30.0));
+  rig.run(20);
+  VehicleFactors said;
+  for (const VehicleFactors& one : {VehicleFactors{to.mass, 0, 0}, VehicleFactors{0, to.damping, 0},
+                                    VehicleFactors{0, 0, 50}}) {
+    const Order order = judged(ordered(one), e, rig.state());
+    said = one.stiffness > 0 ? said : order.vehicle.appliedTo(said);
+    rig.give(order);
+    EXPECT_EQ(rig.state().refusal, one.stiffness > 0 ? Refusal::kUnstable : Refusal::kNone);
+    EXPECT_EQ(rig.state().vehicle_ordered, said);
+    EXPECT_GT(rig.run(20).vehicle.mass, 0.9);  // hardly begun
+  }
+}
+
 TEST(VehicleOrder, IsTakenWhereTheGateLetsItAndLeavesAllElseAsItIs) {
   Rig rig(test::experiment("free_decay"));
   const auto give = [&](const Order& order) { return rig.give(order).refusal; };

@@ -63,6 +63,7 @@ void MotionGenerator::commit(const Waypoint<6>& x) noexcept {
 
 void MotionGenerator::hold() noexcept {
   motion_ = {atRest(motion_.x)};
+  desired_ = motion_.x;
   admittance_.forget();
   endEmulation();
 }

@@ -69,6 +69,12 @@ MotionPlan MotionPlan::of(const PlanSettings& settings, const Segment& segment,
   return plan;
 }
 
+bool MotionPlan::swings() const noexcept {
+  return kind_ == Kind::kTrajectory &&
+         std::find(trajectory_.motion.begin(), trajectory_.motion.end(), AxisMotion::kSine) !=
+             trajectory_.motion.end();
+}
+
 PathPoint<6> MotionPlan::at(std::int64_t n, const RecordedPath& path) const noexcept {
   switch (kind_) {
     case Kind::kPath: return recordedPath(path, n, period_);
@@ -81,33 +87,48 @@ PathPoint<6> MotionPlan::at(std::int64_t n, const RecordedPath& path) const noex
 
 void Rehearsal::begin(const MotionPlan& plan, const Vec6& L) noexcept {
   plan_ = plan;
-  n_ = last_ = 0;
+  stride_ = std::max<std::int64_t>(1, plan.steps() / kPoses);
+  poses_ = (plan.steps() + stride_ - 1) / stride_ + 1;
+  if (plan.swings() && stride_ > 1) {
+    stride_ = 0;
+    poses_ = 2 * kPoses;
+  }
+  k_ = last_ = 0;
   L_last_ = L;
   failure_ = Check::kCount;
   under_way_ = true;
 }
 
+/// [-] periods of the k-th pose; the last pose is the plan's last.
+std::int64_t Rehearsal::periods(std::int64_t k) const noexcept {
+  constexpr double kGolden = 0.6180339887498949;  // [-] whose multiples fill every interval evenly
+  if (k + 1 == poses_) return plan_.steps();
+  if (stride_ > 0) return k * stride_;
+  const double place = kGolden * static_cast<double>(k);
+  return static_cast<std::int64_t>((place - std::floor(place)) *
+                                   static_cast<double>(plan_.steps()));
+}
+
 void Rehearsal::advance(const PathChecks& checks, double period,
                         const RecordedPath& path) noexcept {
-  const std::int64_t stride = std::max<std::int64_t>(1, plan_.steps() / kPoses);
-  for (std::int64_t poses = 0; poses < kPosesATick && n_ <= plan_.steps(); ++poses) {
-    const PathPoint<6> at = plan_.at(n_, path);
+  for (std::int64_t looked = 0; looked < kPosesATick && k_ < poses_; ++looked, ++k_) {
+    const std::int64_t n = periods(k_);
+    const PathPoint<6> at = plan_.at(n, path);
     const Pose x = Pose::from(at.x);
     const BodyMotion P = bodyMotion(checks.geometry().home(), x, at.x_dot, at.x_ddot);
     const LegMotion legs = legMotion(checks.geometry(), P);
     // From one sample to the next, and at the sample itself.
-    const double since = static_cast<double>(std::max<std::int64_t>(1, n_ - last_)) * period;
-    const Tripped t = checks.pose(P.X, x, legs.L) | checks.step(legs.L, L_last_, since) |
-                      checks.step(legs.L + period * legs.L_dot, legs.L, period);
+    const double since = static_cast<double>(std::max<std::int64_t>(1, n - last_)) * period;
+    Tripped t =
+        checks.pose(P.X, x, legs.L) | checks.step(legs.L + period * legs.L_dot, legs.L, period);
+    if (k_ == 0 || stride_ > 0) t = t | checks.step(legs.L, L_last_, since);
     L_last_ = legs.L;
-    last_ = n_;
-    // The last pose too, whatever the stride.
-    n_ = n_ < plan_.steps() ? std::min(n_ + stride, plan_.steps()) : n_ + 1;
+    last_ = n;
     if (!t.any()) continue;
     failure_ = t.first();
     break;
   }
-  under_way_ = failure_ == Check::kCount && n_ <= plan_.steps();
+  under_way_ = failure_ == Check::kCount && k_ < poses_;
 }
 
 }  // namespace ves

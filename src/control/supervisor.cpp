@@ -35,16 +35,18 @@ Refusal Supervisor::obey(const Order& order, const Situation& now, Actuation act
       operator_present_ = false;
       return Refusal::kNone;
     case Request::kRun: return run(order.segment, now, act);
-    case Request::kHold:
+    case Request::kHold: {
+      const bool arming = pending_request_ != Request::kNone;
       pending_request_ = Request::kNone;
       forgetRehearsal();
-      if (!ours()) return Refusal::kNotArmed;
+      if (!ours()) return arming ? Refusal::kNone : Refusal::kNotArmed;
       operator_present_ = true;
       if (phase_ == Phase::kArmed) return Refusal::kNone;
       phase_ = Phase::kRunning;
       segment_ = -1;
       act.motion.brake(now.config.gentle.braking);
       return Refusal::kNone;
+    }
     case Request::kTare:
       if (!ours()) return Refusal::kNotArmed;
       if (runs(act.motion, SegmentKind::kCalibration) || act.bias.taring()) return Refusal::kBusy;
@@ -244,6 +246,7 @@ void Supervisor::endSegment(const Situation& now, Actuation act) noexcept {
   } else if (in_program) {
     beginProgram(segment_ + 1, now, act);
   } else {
+    act.motion.endEmulation();
     phase_ = Phase::kArmed;
   }
 }

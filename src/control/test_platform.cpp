@@ -177,14 +177,15 @@ const TickState& TestPlatform::report(const TickInput& in, const Wrenches& W) no
   state_.desired = motion_.desired();
   state_.request_verdict = in.order.verdict;
   state_.vehicle = motion_.admittance().vehicle();
+  state_.vehicle_ordered = motion_.admittance().vehicleChange().target();
   state_.vehicle_energy = motion_.admittance().vehicleChange().energy();
   state_.thrust =
       state_.kind == SegmentKind::kAdmittance ? motion_.admittance().thrust() : Thrust{};
-  state_.envelope_scale = motion_.admittance().scale();
+  state_.envelope_scale = motion_.emulates() ? motion_.admittance().scale() : 1.0;
   const EnergyAccount& energy = motion_.admittance().energy();
   state_.energy_put_in = energy.putIn();
   state_.energy_paid = energy.paid();
-  state_.passivity_damping = energy.damping();
+  state_.passivity_damping = motion_.emulates() ? energy.damping() : 0.0;
   state_.legs = commander_.legs();
   state_.reference = commander_.reference();
   state_.command = commander_.command();

@@ -104,8 +104,9 @@ void Plant::command(const LegCommand& command) noexcept {
   planRobotEvent();
 }
 
-/// Where the laboratory stops, what floats stops with it, and keeps what it did beside it. Where it
-/// rests and is elsewhere at once, another controller counts from elsewhere, and nothing has moved.
+/// Where the laboratory stops, what floats stops with it, and keeps its place and what it did
+/// beside it: also where a stop has come in the midst of a period, or another controller counts
+/// from elsewhere.
 void Plant::fly(const Laboratory& laboratory) noexcept {
   const auto rests = [](const BodyMotion& H) { return H.v.isZero(0.0) && H.w.isZero(0.0); };
   const BodyMotion before = laboratory_.at(now_), after = laboratory.at(now_);
@@ -113,7 +114,7 @@ void Plant::fly(const Laboratory& laboratory) noexcept {
   if (!rests(after) || (rests(before) && before.X == after.X) || !config_.task.world) return;
   Floating& target = truth_.target;
   const Vec3 home = config_.geometry.home(), p = target.p - home;
-  const Transform moved = rests(before) ? after.X * inverse(before.X) : Transform();
+  const Transform moved = after.X * inverse(before.X);
   target.v = moved.R * (target.v - before.v - before.w.cross(p - before.X.p));
   target.w = moved.R * (target.w - before.w);
   target.p = home + moved * p;
@@ -363,8 +364,8 @@ Wrench Plant::meetWorld(double dt) noexcept {
   if (held) target.v = target.w = Vec3::Zero();
   if (truth_.push && truth_.push->push.on == Push::On::kTarget &&
       truth_.push->share(last_step_ - std::llround(dt * 1e9), now_) > 0.0) {
-    const Mat3 R_EI = laboratory_.flies() ? laboratory_.at(now_).X.R : Mat3(Mat3::Identity());
-    const Wrench on_target_Bo_E = rotate(R_EI, pushed(last_step_ - std::llround(dt * 1e9)));
+    const Wrench on_target_Bo_E =
+        rotate(laboratoryTurn(), pushed(last_step_ - std::llround(dt * 1e9)));
     const FloatingRates with = rates(world.environment, target, on_target_Bo_E),
                         without = rates(world.environment, target, Wrench{});
     target.v += dt * (with.v - without.v);
@@ -382,15 +383,21 @@ Wrench Plant::meetWorld(double dt) noexcept {
   return rotate(X_ES.R.transpose(), shift(mean.on_tool_To_I, X_ES.p - now.X.p));
 }
 
-/// The push's mean since `from` [ns], in {I}: about Po, or about the centre of what floats.
+/// R_EI
+Mat3 Plant::laboratoryTurn() const noexcept {
+  return laboratory_.flies() ? laboratory_.at(now_).X.R : Mat3(Mat3::Identity());
+}
+
+/// The push's mean since `from` [ns], in {I}: about Po, or about the centre of what floats, whose
+/// place is in {E}.
 Wrench Plant::pushed(std::int64_t from) const noexcept {
   const Push& push = truth_.push->push;
   const Vec3 f = truth_.push->share(from, now_) * push.force_I;
   const Transform X_IB = truth_.target.X_IB();
   const Vec3 at =
       pushedPoint(push, truth_.P.X, config_.payload.X_PL0(), robot_.model(), truth_.joints.q, X_IB);
-  const Vec3 about = push.on == Push::On::kTarget ? X_IB.p : truth_.P.X.p;
-  return {f, (at - about).cross(f)};
+  if (push.on != Push::On::kTarget) return {f, (at - truth_.P.X.p).cross(f)};
+  return {f, (laboratoryTurn().transpose() * (at - X_IB.p)).cross(f)};
 }
 
 /// F_L0o_L0. A robot that stands is one body.

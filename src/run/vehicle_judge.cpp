@@ -10,7 +10,7 @@ namespace ves {
 Order judged(Order order, const Experiment& experiment, const TickState& state) {
   if (order.request != Request::kVehicle) return order;
   order.verdict = assessChange(experiment.controller, experiment.plant.task, state.vehicle,
-                               order.vehicle.appliedTo(state.vehicle));
+                               order.vehicle.appliedTo(state.vehicle_ordered));
   return order;
 }
 

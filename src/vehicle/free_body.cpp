@@ -151,8 +151,10 @@ void FreeBody::step(const Wrench& F_Po_I, const CarriedBody& carried, double dt,
   before_ = now_;
   dt_ = dt;
   thrust_.time = now_.time;
-  for (int i = 0; i < kMostThrusters; ++i)
-    thrust_.left(i) = std::max(0.0, now_.ordered[static_cast<std::size_t>(i)].on.until - now_.time);
+  for (int i = 0; i < kMostThrusters; ++i) {
+    const Firing& on = now_.ordered[static_cast<std::size_t>(i)].on;
+    thrust_.left(i) = on.until > on.from ? std::max(0.0, on.until - now_.time) : 0.0;
+  }
   const RigidState& from = before_.rigid;
   const Mat6 own = massInP();
   const Gyrostat before{own + rotated(carried.R_IP_before.transpose(), carried.before),

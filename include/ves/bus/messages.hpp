@@ -25,7 +25,7 @@
 namespace ves {
 
 /// Of all messages and of the columns of series.csv; readers refuse others.
-inline constexpr std::int32_t kSchema = 13;
+inline constexpr std::int32_t kSchema = 14;
 
 /// Who sends, and since when.
 struct Identity {

@@ -330,6 +330,10 @@ constexpr auto fields(S& s) {
       Field{"vehicle_mass", "-", s.vehicle.mass, "of the vehicle in use, times the configured"},
       Field{"vehicle_damping", "-", s.vehicle.damping, "the same"},
       Field{"vehicle_stiffness", "-", s.vehicle.stiffness, "the same"},
+      Field{"vehicle_mass_ordered", "-", s.vehicle_ordered.mass,
+            "where that goes, as ordered last"},
+      Field{"vehicle_damping_ordered", "-", s.vehicle_ordered.damping, "the same"},
+      Field{"vehicle_stiffness_ordered", "-", s.vehicle_ordered.stiffness, "the same"},
       Field{"vehicle_energy", "J", s.vehicle_energy,
             "that the last change of the vehicle has put in, less what was taken for it"},
       Field{"vehicle_time", "s", s.thrust.time,
@@ -343,7 +347,7 @@ constexpr auto fields(S& s) {
 }
 
 static_assert(members<Sample>() == 17 && members<LegCommand>() == 8 &&
-                  members<MachineSetup>() == 17 && members<TickState>() == 53 &&
+                  members<MachineSetup>() == 17 && members<TickState>() == 54 &&
                   members<Order>() == 7 && members<VehicleOrder>() == 2 &&
                   members<VehicleFactors>() == 3 && members<VehicleVerdict>() == 2 &&
                   members<Thrust>() == 3 && members<Segment>() == 5 && members<Trajectory>() == 4,

@@ -98,7 +98,7 @@ struct TickState {
   std::int64_t late_ticks = 0;
   LegCommand command;
   VehicleVerdict request_verdict;
-  VehicleFactors vehicle;
+  VehicleFactors vehicle, vehicle_ordered;
   double vehicle_energy = 0.0;
   Thrust thrust;
 };

@@ -44,8 +44,11 @@ class MotionGenerator {
   void commit(const Waypoint<6>& x) noexcept;
   /// The last commanded pose is held from now on.
   void hold() noexcept;
+  /// Nothing is emulated any more.
+  void endEmulation() noexcept;
 
   SegmentKind kind() const noexcept { return segment_.kind; }
+  bool emulates() const noexcept { return emulates_; }  // the admittance model runs
   /// The plan is at its end; a monitor segment at `tick` too. A calibration ends by itself.
   bool over(std::int64_t tick) const noexcept;
   bool moving() const noexcept { return !motion_.x_dot.isZero(0.0); }
@@ -66,7 +69,6 @@ class MotionGenerator {
 
  private:
   void follow(const MotionPlan& plan) noexcept;
-  void endEmulation() noexcept;
 
   PlanSettings settings_;
   RecordedPath path_;

@@ -41,6 +41,7 @@ class MotionPlan {
   /// n periods after the beginning. `path` is the recorded one.
   PathPoint<6> at(std::int64_t n, const RecordedPath& path) const noexcept;
   std::int64_t steps() const noexcept { return steps_; }  // [-] periods that it lasts
+  bool swings() const noexcept;                           // a coordinate goes by a sine
 
  private:
   enum class Kind { kMove, kTrajectory, kPath };
@@ -54,7 +55,8 @@ class MotionPlan {
 };
 
 /// Goes through a move or a trajectory before it begins, some poses a tick: the path checks at up
-/// to kPoses poses, and those of a step from each to the next.
+/// to kPoses poses, and those of a step from each to the next. Of sines that last longer it looks
+/// at twice as many places that no period divides: evenly spaced ones may all be alike.
 class Rehearsal {
  public:
   static constexpr std::int64_t kPoses = 1000;      // [-]
@@ -70,9 +72,13 @@ class Rehearsal {
   Check failure() const noexcept { return failure_; }
 
  private:
+  std::int64_t periods(std::int64_t k) const noexcept;
+
   MotionPlan plan_;
-  std::int64_t n_ = 0;     // [-] periods of the plan so far
-  std::int64_t last_ = 0;  // [-] of the pose before
+  std::int64_t stride_ = 1;  // [-] periods between poses that follow each other; 0: they do not
+  std::int64_t poses_ = 0;   // [-] in all
+  std::int64_t k_ = 0;       // [-] poses so far
+  std::int64_t last_ = 0;    // [-] periods of the pose before
   Vec6 L_last_ = Vec6::Zero();
   Check failure_ = Check::kCount;
   bool under_way_ = false;

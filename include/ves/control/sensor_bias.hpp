@@ -54,7 +54,11 @@ class SensorBias {
     tare_.step(sample, fresh, static_counts, found_);
   }
 
-  void beginCalibration() noexcept { calibration_.begin(); }
+  /// A tare that is under way is given up: it would slide away from what is found.
+  void beginCalibration() noexcept {
+    cancelTare();
+    calibration_.begin();
+  }
   void calibrate(const Sample& sample, bool fresh, const Vec6& static_counts) noexcept;
 
   /// [count] beyond found(), by what the measurement shows of it; not during a tare.

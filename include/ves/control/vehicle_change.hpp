@@ -18,6 +18,8 @@ class VehicleChange {
   /// `damping` [1/s] of every mode, at most.
   VehicleChange(double period, double damping) noexcept;
 
+  /// What was ordered last.
+  const VehicleFactors& target() const noexcept { return to_; }
   /// What an order leads to; what it leaves stays as it was ordered last.
   VehicleFactors ordered(const VehicleOrder& order) const noexcept;
   /// From the model's factors.

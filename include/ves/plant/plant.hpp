@@ -153,6 +153,7 @@ class Plant {
   FrameMotion toolMotion() const noexcept;
   bool push(const Push& push) noexcept;
   Wrench pushed(std::int64_t from) const noexcept;
+  Mat3 laboratoryTurn() const noexcept;
   Wrench meetWorld(double dt) noexcept;
   PlatformLoad platformLoad(const Wrench& further_So_S) noexcept;
   double reading(std::size_t leg) noexcept;
