@@ -58,6 +58,21 @@ std::vector<std::string> conditionsOf(const RunnerOptions& options, const Wanted
                   100.0 * wanted.tests.share)};
 }
 
+/// A limit that nothing of what is asked for measures is known before anything moves.
+void requireMeasured(const AcceptanceLimit& limit, const Wanted& wanted) {
+  const auto has = [](const std::vector<std::string>& asked, const std::string& one) {
+    return asked.empty() || std::find(asked.begin(), asked.end(), one) != asked.end();
+  };
+  const auto refuse = [&](const std::string& one, const char* option) {
+    throw InputError(fmt::format("--limits {}: '{}' is not measured without {} among {}",
+                                 wanted.limits, limit.text, one, option));
+  };
+  for (const std::string& one : limit.of)
+    if (!one.starts_with("leg_") && !has(wanted.coordinates, one)) refuse(one, "--coordinates");
+  const std::string part = partOf(limit.quantity);
+  if (!part.empty() && !has(wanted.parts, part)) refuse(part, "--tests");
+}
+
 int accept(RunnerOptions& options, Wanted& wanted) {
   if (wanted.moves && options.process.lockstep)
     throw InputError("--move: a machine on the bus keeps its own time, want no --lockstep");
@@ -65,6 +80,7 @@ int accept(RunnerOptions& options, Wanted& wanted) {
   printWarnings(scenario, options.verbose);
   const std::vector<AcceptanceLimit> limits =
       wanted.limits.empty() ? std::vector<AcceptanceLimit>() : readLimits(wanted.limits);
+  for (const AcceptanceLimit& limit : limits) requireMeasured(limit, wanted);
   std::vector<AcceptanceTest> tests;
   double seconds = 0.0;
   for (const int i : coordinatesOf(wanted.coordinates)) {
@@ -80,6 +96,7 @@ int accept(RunnerOptions& options, Wanted& wanted) {
           ? claimNewFolder(fmt::format("ves-runs/accept_{}-{:%Y%m%d-%H%M%S}", scenario.name,
                                        fmt::localtime(std::time(nullptr))))
           : claimFolder(options.out);
+  if (!options.overwrite) requireWithout(folder, options.out, {"accept.csv", "accept.html"});
 
   std::vector<CoordinateResult> found;
   std::string stopped;
@@ -178,11 +195,7 @@ int acceptCommand(int argc, char** argv) {
       ->check(inRange(1e-4, 0.01))
       ->capture_default_str();
   wanted.command = "./ves accept";
-  for (int i = 1; i < argc; ++i) {
-    const std::string word = argv[i];
-    const bool plain = word.find_first_of(" {}[]*?$'\"\\") == std::string::npos;
-    wanted.command += plain ? " " + word : " '" + word + "'";
-  }
+  for (int i = 1; i < argc; ++i) wanted.command += " " + asTyped(argv[i]);
   return run(cli, argc, argv, [&] {
     const auto rising = [](const std::vector<double>& all, double sign) {
       for (std::size_t i = 1; i < all.size(); ++i)

@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "help.hpp"
+#include "outputs.hpp"
 #include "ves/analysis/leaning.hpp"
 #include "ves/config/experiment.hpp"
 #include "ves/core/build.hpp"
@@ -47,6 +48,16 @@ inline CLI::Validator inRange(double lo, double hi) {
                        : fmt::format("'{}', want a number in [{}, {}]", text, lo, hi);
           },
           fmt::format("in [{}, {}]", lo, hi)};
+}
+
+inline CLI::Validator aboveZero() {
+  return {[](std::string& text) {
+            double x = NAN;
+            const bool number = CLI::detail::lexical_cast(text, x);
+            return number && x > 0.0 ? std::string()
+                                     : fmt::format("'{}', want a number above 0", text);
+          },
+          "above 0"};
 }
 
 inline int allCores() {
@@ -251,14 +262,6 @@ inline std::string whyNot(const RunResult& result, const std::string& log = "") 
                                              : refusedSegment(result.aborted_by);
 }
 
-/// Throws InputError, naming the option, when it cannot be written.
-inline void writeGiven(const char* option, const std::string& file, const std::string& text) {
-  std::ofstream out(file, std::ios::binary);
-  out << text;
-  out.close();
-  if (!out) throw InputError(fmt::format("{} {}: {}", option, file, std::strerror(errno)));
-}
-
 /// Environment: the token of a socket that `ves view` inherits. Arguments are for all to see.
 inline constexpr const char* kViewToken = "VES_VIEW_TOKEN";
 
@@ -291,6 +294,14 @@ inline std::string optionMeant(const CLI::App& cli, const std::string& said) {
   return meant.empty() ? "" : fmt::format(", did you mean {}?", meant);
 }
 
+/// The names of its subcommands.
+inline std::string partsOf(const CLI::App& cli) {
+  std::string out;
+  for (const CLI::App* sub : cli.get_subcommands([](const CLI::App*) { return true; }))
+    out += (out.empty() ? "" : ", ") + sub->get_name();
+  return out;
+}
+
 /// Parses, runs, and turns bad input into one line and status 2.
 inline int run(CLI::App& cli, int argc, char** argv, const std::function<int()>& body) {
   cli.formatter(std::make_shared<EightyColumns>());
@@ -304,6 +315,12 @@ inline int run(CLI::App& cli, int argc, char** argv, const std::function<int()>&
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return cli.exit(error);  // --help
     const bool unknown = dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr;
+    if (const std::string parts = partsOf(cli); !parts.empty() && cli.get_subcommands().empty()) {
+      const bool named = argc > 1 && argv[1][0] != '-';
+      fmt::print(stderr, "{}: {}want one of {} (see --help)\n", cli.get_name(),
+                 named ? fmt::format("'{}': ", shortened(argv[1])) : "", parts);
+      return kBadInput;
+    }
     fmt::print(stderr, "{}: {}{} (see --help)\n", cli.get_name(), shortened(error.what()),
                unknown ? optionMeant(cli, error.what()) : "");
     return kBadInput;
@@ -318,6 +335,16 @@ inline int run(CLI::App& cli, int argc, char** argv, const std::function<int()>&
     fmt::print(stderr, "{}: {}\n", cli.get_name(), shortened(error.what()));
     return kBadInput;
   }
+}
+
+/// As a shell takes it for one word.
+inline std::string asTyped(const std::string& word) {
+  constexpr const char* kPlain =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=:,./@%";
+  if (!word.empty() && word.find_first_not_of(kPlain) == std::string::npos) return word;
+  std::string out = "'";
+  for (const char c : word) out += c == '\'' ? "'\\''" : std::string(1, c);
+  return out + "'";
 }
 
 /// A title and columns beneath each other.
@@ -348,6 +375,9 @@ inline void printDamage(const Damage& damage) {
 inline Series seriesOf(const std::string& log, const std::string& scenario) {
   const std::optional<Experiment> without = scenarioOfLog(scenario);
   Series series = readSeries(log, without ? &*without : nullptr);
+  if (without && !series.version.empty())
+    throw InputError(
+        fmt::format("--scenario {}: {} has its own configuration; leave it out", scenario, log));
   printDamage(series.damage);
   return series;
 }

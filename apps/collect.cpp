@@ -22,10 +22,11 @@ namespace {
 int writeMcap(const Series& series, const std::string& log, const std::string& file) {
   const std::optional<Emulation> both = emulation(series);
   const auto poses = both ? basePoses(series, both->base) : std::map<std::int64_t, Vec6>();
-  McapExport out(series.experiment, series.version, file, [&](const Row& row) {
-    const auto at = poses.find(row.state.header.sequence);
-    return at == poses.end() ? std::nullopt : std::optional<Vec6>(at->second);
-  });
+  McapExport out(series.experiment, series.version.empty() ? describeBuild() : series.version, file,
+                 [&](const Row& row) {
+                   const auto at = poses.find(row.state.header.sequence);
+                   return at == poses.end() ? std::nullopt : std::optional<Vec6>(at->second);
+                 });
   Damage damage;  // told with the series
   OrderedLog reader(log, &damage);
   for (LogEvent event; reader.next(event);) out.add(event);
@@ -82,6 +83,7 @@ int collectCommand(int argc, char** argv) {
   return run(cli, argc, argv, [&] {
     if (follow == !log.empty() || (follow && mcap.empty()))
       throw InputError("want a log, or --follow with --mcap FILE");
+    if (!mcap.empty()) requireReplaceable("--mcap", mcap, "\x89MCAP");
     joinIfNamed(join);
     if (follow) return followIntoMcap(url, mcap);
     const Series series = seriesOf(log, scenario);
@@ -100,6 +102,7 @@ int collectCommand(int argc, char** argv) {
 
     std::ofstream file;
     if (!out.empty()) {
+      requireReplaceable("--out", out, "t_s");
       file.open(out);
       if (!file) throw InputError(fmt::format("--out {}: cannot be written", out));
     }

@@ -44,8 +44,10 @@ int commission(RunnerOptions& options, const CommissioningOptions& wanted) {
   const Experiment believing = options.load();
   const std::vector<Table> tables =
       tablesOf(series, c, found, forecastError(scenario, believing, found));
-  const std::string use = fmt::format("{} run {} --belief {}", frontDoor(), options.scenario,
-                                      file.lexically_normal().string());
+  std::string use = fmt::format("{} run {}", frontDoor(), asTyped(options.scenario));
+  for (const std::string& one : options.overrides) use += " --set " + asTyped(one);
+  use += fmt::format("{} --belief {}", options.process.lockstep ? " --lockstep" : "",
+                     asTyped(file.lexically_normal().string()));
   Page page;
   page.section("To use it");
   page.text(use);

@@ -105,6 +105,7 @@ int compareCommand(int argc, char** argv) {
   cli.add_option("--html", html, "a page with the tables and overlaid curves");
   addScenarioOfLog(cli, scenario);
   return run(cli, argc, argv, [&] {
+    if (!html.empty()) requireReplaceable("--html", html, "<!DOCTYPE");
     std::vector<ComparedRun> runs;
     std::vector<const Experiment*> experiments;
     std::vector<nlohmann::ordered_json> summaries;

@@ -26,7 +26,7 @@ auto orRefuse(const std::string& about, const F& f) {
 int keep(const std::string& file, const std::string& yaml, const auto& read) {
   const Value written = parseDocument(yaml, file);
   read(Section(written, ""));
-  writeFile(file, yaml);
+  writeGiven("--out", file, yaml);
   fmt::print("{}\n", file);
   return kDone;
 }
@@ -57,9 +57,9 @@ int plan(const std::string& scenario, const std::vector<std::string>& overrides,
   std::filesystem::path from = std::filesystem::proximate(std::filesystem::absolute(base), folder);
   if (!overrides.empty()) {  // what it builds on is no file yet
     from = std::filesystem::path(file).stem().string() + "_base.yaml";
-    writeFile(folder / from, e.source.resolved);
+    writeGiven("--out", (folder / from).string(), e.source.resolved);
   }
-  writeFile(file, scenarioOf(plan, e, name, from.string()));
+  writeGiven("--out", file, scenarioOf(plan, e, name, from.string()));
   loadExperiment(file);  // what is refused is refused now
   fmt::print(
       "{} of {} parameters can be told apart; condition number {:.1f}, of random poses "
@@ -133,10 +133,11 @@ int servo(const std::string& log, const std::string& scenario, const std::string
   // Slow motions leave tau to the rounding of counts, which no deviation knows of.
   const double tau = found.servo.tau.mean(), told = series.experiment.controller.servo.tau.mean();
   if (!(tau < 1.5 * told && tau > told / 1.5))
-    fmt::print(stderr,
-               "warning: tau of {:.3g} ms, where the configuration says {:.3g}: slow motions do not "
-               "tell it; want a log of quick ones, as of servo_identification\n",
-               tau * 1e3, told * 1e3);
+    fmt::print(
+        stderr,
+        "warning: tau of {:.3g} ms, where the configuration says {:.3g}: slow motions do not "
+        "tell it; want a log of quick ones, as of servo_identification\n",
+        tau * 1e3, told * 1e3);
   if (all.sensor)
     fmt::print(
         "wrench: {:.0f} +- {:.0f} us later than the servos and its filter say; shows {:.4f} +- "
@@ -170,7 +171,7 @@ int iterate(Options& load, const IterativeOptions& options, const std::string& f
     for (const auto& x : r.path.colwise())
       text += fmt::format("  - [{:.7g}, {:.7g}, {:.7g}, {:.7g}, {:.7g}, {:.7g}]\n", x(0), x(1),
                           x(2), x(3) / kDegree, x(4) / kDegree, x(5) / kDegree);
-    writeFile(file, text);
+    writeGiven("--out", file, text);
     fmt::print("{}\n", file);
   }
   return r.converged ? kDone : kTripped;

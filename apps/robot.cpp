@@ -71,6 +71,8 @@ int robotCommand(int argc, char** argv) {
         file.find_first_of("./") == std::string::npos && !std::filesystem::exists(file, error);
     const std::string found =
         named ? findFile("robot", file, configFolder() / "robots").string() : file;
+    if (std::filesystem::path(found).extension() == ".yaml" && loadDocument(found).find("program"))
+      throw InputError(fmt::format("{}: is a scenario, want its robot's file", found));
     const auto [described, robot, q] = loadRobot(found, sets);
     const RigidBody all = compositeBody(robot.model, q);
     const Vec3 moments = symmetricEigenvalues(all.I_Bcm_B);

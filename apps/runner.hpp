@@ -27,7 +27,8 @@ struct RunnerOptions : Options {
   bool on_bus = false;  // prepareBus() was here
 
   void addOut(CLI::App& cli) {
-    cli.add_option("--out", out, "folder for the results; a new one in ves-runs by default");
+    cli.add_option("--out", out, "folder for the results; a new one in ves-runs by default")
+        ->check([](const std::string& given) { return given.empty() ? "want a folder" : ""; });
     cli.add_flag("--overwrite", overwrite, "where a run is in that folder already");
   }
   void addView(CLI::App& cli) {
@@ -52,9 +53,10 @@ inline LaunchOptions prepareFolder(RunnerOptions& options, const Experiment& exp
           ? claimNewFolder(fmt::format("ves-runs/{}-{:%Y%m%d-%H%M%S}", experiment.name,
                                        fmt::localtime(std::time(nullptr))))
           : claimFolder(options.out);
-  if (!options.overwrite && std::filesystem::exists(folder / "run.lcmlog"))
-    throw InputError(
-        fmt::format("--out {}: a run is there already, want another or --overwrite", options.out));
+  if (!options.overwrite)
+    requireWithout(folder, options.out,
+                   {"run.lcmlog", "experiment.yaml", "series.csv", "summary.json", "contacts.csv",
+                    "belief.yaml", "commission.html"});
   LaunchOptions launch;
   launch.program = ownProgram();
   launch.scenario = folder / "experiment.yaml";

@@ -83,6 +83,7 @@ int simulateBoth(const std::string& scenario, const std::vector<std::string>& ov
                     e.name, base.stiffness.size(), fastest, kFastest));
   std::ofstream to;
   if (!file.empty()) {
+    requireReplaceable("--out", file, "t_s");
     to.open(file);
     if (!to) throw InputError(fmt::format("--out {}: cannot be written", file));
   }

@@ -215,7 +215,7 @@ int drawMap(const Experiment& e, const MapAxis& x, const MapAxis& y,
     if (shown) fmt::print(stderr, "\r{:3.0f} %", 100.0 * (j + 1) / kPoints);
   }
   if (shown) fmt::print(stderr, "\r     \r");
-  writeFile(folder / "map.csv", csv);
+  writeGiven("--out", (folder / "map.csv").string(), csv);
   draw(fmt::format(
            "$map << EOD\n{}EOD\n{}set output 'map.png'\nset title {}\nset xlabel {}\n"
            "set ylabel {}\nset cblabel 'growth [1/s]'\n"
@@ -251,7 +251,7 @@ int drawPublished(const std::filesystem::path& folder) {
     }
     data += "\n";
   }
-  writeFile(folder / "figure_e4.csv", csv);
+  writeGiven("--out", (folder / "figure_e4.csv").string(), csv);
   std::string script =
       "$e4 << EOD\n" + data + "EOD\n" + kLook +
       "set output 'figure_e4.png'\nset multiplot layout 1,2 margins 0.07,0.92,0.13,0.92 "

@@ -64,7 +64,8 @@ int sweepCommand(int argc, char** argv) {
       "ves sweep");
   std::string scenario, out, figure;
   double until = 0.0;
-  SweepDesign design = SweepDesign::kUniform;
+  const std::vector<std::string> designs = {"uniform", "latin", "sobol", "subset"};
+  std::string laid = designs.front();
   std::vector<std::string> sets, vary, draw;
   std::int64_t runs = 1;
   std::uint64_t seed = 1;
@@ -78,18 +79,14 @@ int sweepCommand(int argc, char** argv) {
       ->check(CLI::Range(1, 100'000'000))
       ->capture_default_str();
   cli.add_option(
-         "--design", design,
+         "--design", laid,
          "how draws lie: uniform, latin (hypercube), sobol, or subset: ever nearer to --figure's "
          "limit, --runs a level, to tell how often it is passed where that is rare")
-      ->transform(CLI::CheckedTransformer(
-          std::map<std::string, SweepDesign>{{"uniform", SweepDesign::kUniform},
-                                             {"latin", SweepDesign::kLatin},
-                                             {"sobol", SweepDesign::kSobol},
-                                             {"subset", SweepDesign::kSubset}}));
+      ->check(CLI::IsMember(designs));
   cli.add_option("--figure", figure,
                  "COLUMN, whose mean is told, or COLUMN>LIMIT: how often; with 95 % confidence");
   cli.add_option("--until", until, "half of that interval, at which no more runs are needed")
-      ->check(CLI::PositiveNumber)
+      ->check(aboveZero())
       ->needs("--figure");
   cli.add_option("--seed", seed, "of draws and noise")
       ->check(CLI::Range(std::int64_t{0}, std::int64_t{UINT32_MAX}))
@@ -103,8 +100,10 @@ int sweepCommand(int argc, char** argv) {
     for (const std::string& option : draw) plan.draw(option);
     plan.repeat(runs);
     plan.seed(seed);
+    const auto design =
+        static_cast<SweepDesign>(std::find(designs.begin(), designs.end(), laid) - designs.begin());
     plan.lay(design);
-    if (plan.size() == 1) throw InputError("one run only: want --vary or --runs");
+    if (plan.size() == 1) throw InputError("one run only: want more values of --vary, or --runs");
     SweepOptions options;
     options.scenario = findScenario(scenario, configFolder());
     options.overrides = sets;

@@ -155,13 +155,15 @@ int dispatch(int argc, char** argv) {
   } else if (word == "help" || word == "--help" || word == "-h") {
     printUsage(stdout);
   } else {
-    printUsage(stderr);
+    if (word.empty()) {
+      printUsage(stderr);
+      return kBadInput;
+    }
     std::vector<std::string_view> names;
     for (const Command& c : kCommands) names.push_back(c.name);
-    const std::string meant = word.empty() ? "" : nearest(word, names);
-    if (!word.empty())
-      fmt::print(stderr, "\nves: unknown command '{}'{}\n", word,
-                 meant.empty() ? "" : fmt::format(", did you mean '{}'?", meant));
+    const std::string meant = nearest(word, names);
+    fmt::print(stderr, "ves: unknown command '{}'{} (see ves help)\n", word,
+               meant.empty() ? "" : fmt::format(", did you mean '{}'?", meant));
     return kBadInput;
   }
   return kDone;

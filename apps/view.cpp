@@ -72,6 +72,11 @@ int writeFilm(ViewOptions options) {
   options.film.rate = options.rate.value_or(options.film.rate);
   catchSignals();
   const PageFile page(recordedPage(options, options.film.rate / options.film.speed));
+  const std::string ending = std::filesystem::path(options.video).extension();
+  requireReplaceable("--video", options.video,
+                     ending == ".gif"    ? std::string_view("GIF8")
+                     : ending == ".webm" ? std::string_view("\x1A\x45\xDF\xA3")
+                                         : std::string_view("\0\0\0", 3));
   const bool terminal = isatty(STDERR_FILENO);
   int done = 0;
   film(page.path(), options.video, options.film, [&](int count, int of) {
@@ -89,6 +94,9 @@ int writeFilm(ViewOptions options) {
 int writePrint(const ViewOptions& options) {
   constexpr double kEveryTick = 1000.0;  // [1/s]
   catchSignals();
+  const double end = seriesOf(options.logs.front(), options.scenario).rows.back().t;
+  if (options.at > end)
+    throw InputError(fmt::format("--at {}: the log ends at {:.6g} s", options.at, end));
   const PageFile page(recordedPage(options, kEveryTick));
   writeGiven("--png", options.png, print(page.path(), options.at, options.film));
   fmt::print("{}: 300 dots an inch\n", options.png);

@@ -370,6 +370,23 @@ INSTANTIATE_TEST_SUITE_P(
             "base={arm: {damping_ratio: 0, stiffness_scale: 1, pose_deg: {}, chain: [{beam: {to_m: "
             "[1, 0, 0], EI_n_m2: 1, GJ_n_m2: 1, EA_n: 1, mass_kg: 0, radius_m: 0, elements: 1}}]}}",
             "base.arm.chain: a part that can move has no mass"},
+        Bad{"hanging_platform", "z_sine", "gravity_m_per_s2=[0, 1.7, 9.66]",
+            "gravity_m_per_s2: [0, 1.7, 9.66] points up"},
+        Bad{"move_out_of_the_workspace", "z_sine", "program=[{move: {}}, {move: {to: {z_m: 0.5}}}]",
+            "program[1].move: the motion limits check would stop the run; want a target nearer"},
+        Bad{"hasty_move", "z_sine", "program=[{move: {duration_s: 0.1, to: {z_m: 0.2}}}]",
+            "program[0].move: the velocity check would stop the run"},
+        Bad{"move_from_nobody_knows_where", "z_sine",
+            "program=[{move: {}}, {calibration: {}}, {admittance: {duration_s: 1}}, {move: {to: "
+            "{alpha_deg: 60}}}]",
+            "program[3].move: the motion limits check would stop the run"},
+        Bad{"sine_out_of_the_workspace", "z_sine",
+            "program=[{move: {}}, {trajectory: {duration_s: 4, z: {ramp: {to_m: 0.1}}}}, "
+            "{trajectory: {duration_s: 9, z: {sine: {amplitude_m: 0.25, frequency_hz: 0.1}}}}]",
+            "program[2].trajectory: the motion limits check would stop the run; want less of it"},
+        Bad{"wide_tilt", "puma_on_table_4_1",
+            "program=[{move: {}}, {calibration: {}}, {excite: {tilt_deg: 45, duration_s: 20}}]",
+            "program[2].excite.tilt_deg: the motion limits check would stop the run"},
         Bad{"two_signs", "z_sine", "gravity_m_per_s2=+-1",
             "gravity_m_per_s2: '+-1', want a number in [0, 100]"},
         Bad{"nan", "z_sine", "legs.tau_s=nan", "legs.tau_s: 'nan', want a number in [1e-06, 1]"},

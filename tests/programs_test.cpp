@@ -126,10 +126,48 @@ TEST_F(Programs, ARunThatIsThereIsKept) {
   const std::string before = test::readText((folder_ / "a/summary.json").string());
   const Output o = run("ramp --seed 5 --lockstep --no-plots" + out("a"));
   EXPECT_EQ(o.status, 2);
-  EXPECT_NE(o.text.find("a run is there already, want another or --overwrite"), std::string::npos);
+  EXPECT_NE(o.text.find("run.lcmlog is there already, want another or --overwrite"),
+            std::string::npos);
   EXPECT_EQ(test::readText((folder_ / "a/summary.json").string()), before);
   EXPECT_EQ(run("ramp --seed 5 --lockstep --no-plots --overwrite" + out("a")).status, 0);
   EXPECT_NE(test::readText((folder_ / "a/summary.json").string()), before);
+}
+
+// What a command is told to write takes the place of nothing but its like: not of the log that it
+// reads, nor of somebody's file.
+TEST_F(Programs, WhatIsSomethingElseIsKept) {
+  ASSERT_EQ(run("ramp --lockstep --no-plots --quiet" + out("a")).status, 0);
+  const std::string log = file("a/run.lcmlog"), text = file("text");
+  std::ofstream(text) << "precious\n";
+  const std::string recorded = test::readText(log);
+  for (const std::string& before : {log, text}) {
+    const std::string kept = test::readText(before), in = file("a") + " ";
+    for (const std::string& command :
+         {app("collect") + in + "--out ", app("collect") + in + "--mcap ",
+          app("view") + in + "--html ", app("view") + in + "--svg ",
+          app("compare") + in + in + "--html ", app("view") + in + "--to 0.1 --video ",
+          app("srms") + "simulate free_decay --out "}) {
+      expectRefusal(command + before, "something else is there already");
+      EXPECT_EQ(test::readText(before), kept) << command;
+    }
+  }
+  EXPECT_EQ(test::readText(log), recorded);
+  for (const char* name : {"x.csv", "x.html"})  // its like
+    for (int i = 0; i < 2; ++i)
+      EXPECT_EQ(test::sh(std::string(name).ends_with("csv")
+                             ? app("collect") + file("a") + " --out " + file(name)
+                             : app("view") + file("a") + " --html " + file(name))
+                    .status,
+                0)
+          << name;
+  std::filesystem::create_directory(folder_ / "b");
+  for (const char* name : {"belief.yaml", "summary.json", "series.csv"}) {
+    std::filesystem::rename(text, file("b/") + name);
+    for (const char* command : {"run", "commission"})
+      expectRefusal(app(command) + "puma_on_table_4_1 --lockstep --quiet" + out("b"),
+                    std::string(name) + " is there already, want another or --overwrite");
+    std::filesystem::rename(file("b/") + name, text);
+  }
 }
 
 TEST_F(Programs, TheNewestRunHasAName) {

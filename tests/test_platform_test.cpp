@@ -5,6 +5,7 @@
 
 #include <limits>
 
+#include "support/refusal.hpp"
 #include "support/rig.hpp"
 #include "ves/control/test_platform.hpp"
 
@@ -20,7 +21,8 @@ class Bench {
  public:
   explicit Bench(const std::string& scenario, const std::vector<std::string>& set = {},
                  const Pose& found = {{0.01, -0.02, -0.05}, {0.02, 0.0, 0.01}})
-      : e_(experiment(scenario, set)), platform_(e_.controller) {
+      : Bench(experiment(scenario, set), found) {}
+  Bench(const Experiment& e, const Pose& found) : e_(e), platform_(e_.controller) {
     const Geometry& g = e_.controller.geometry;
     in_.sample.legs = legCounts(e_.controller.legs, legLengths(g, g.fromHome(found)));
     in_.sample.q = e_.plant.task.initial_joints;
@@ -171,9 +173,18 @@ class Limits : public testing::TestWithParam<Crossing> {};
 
 TEST_P(Limits, StopTheProgramThatCrossesThem) {
   const Crossing& c = GetParam();
-  std::vector<std::string> set = {c.limit};
+  std::vector<std::string> set;
   if (c.program) set.push_back(c.program);
-  Bench bench(c.scenario, set, Pose{});
+  // Such a program is refused when it is read: the limit comes afterwards.
+  EXPECT_NE(test::refusal([&] {
+              std::vector<std::string> both = set;
+              both.emplace_back(c.limit);
+              experiment(c.scenario, both);
+            }).find(fmt::format("the {} check would stop the run", name(c.check))),
+            std::string::npos);
+  Experiment e = experiment(c.scenario, set);
+  e.controller.safety = experiment(c.scenario, {c.limit, "program=[{move: {}}]"}).controller.safety;
+  Bench bench(e, Pose{});
   LegCounts last{};
   const TickState* state = nullptr;
   for (int i = 0; i < 3000; ++i) {

@@ -39,6 +39,11 @@ AcceptanceLimit readLimit(Section& s) {
     for (const std::string& one : s.texts("of")) {
       if (std::find(all.begin(), all.end(), one) == all.end())
         s.fail("of", fmt::format("'{}', want some of {}", one, fmt::join(all, ", ")));
+      const bool of_legs = out.quantity == Quantity::kHysteresis ||
+                           out.quantity == Quantity::kOffset || out.quantity == Quantity::kLag;
+      if (one.starts_with("leg_") && !of_legs)
+        s.fail("of",
+               fmt::format("{} has no {}, want hysteresis, offset or lag of it", one, quantity));
       out.of.push_back(one);
     }
   }
@@ -97,6 +102,19 @@ std::vector<AcceptanceLimit> readLimits(const std::filesystem::path& file) {
   for (Section one : root.list("limits")) out.push_back(readLimit(one));
   root.finish();
   return out;
+}
+
+const char* partOf(Quantity quantity) noexcept {
+  switch (quantity) {
+    case Quantity::kHysteresis:
+    case Quantity::kOffset:
+    case Quantity::kLag: return "passes";
+    case Quantity::kThreshold: return "steps";
+    case Quantity::kRestPosition:
+    case Quantity::kRestAcceleration:
+    case Quantity::kCount: return "";
+    default: return "sines";
+  }
 }
 
 const char* name(Is is) {

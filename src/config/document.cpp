@@ -263,7 +263,8 @@ Value parse(const std::string& text, const std::string& name) {
 Value load(const std::filesystem::path& path, const std::string& asked_by, int depth) {
   Value value = parse(readFile(path, asked_by), path.lexically_normal().string());
   if (value.kind != Value::Kind::kMap)
-    throw InputError(fmt::format("{}:1: want a map of keys", path.string()));
+    throw InputError(fmt::format("{}:1: {}want a map of keys", path.string(),
+                                 value.kind == Value::Kind::kNull ? "nothing is in it, " : ""));
   resolve(value, path.parent_path(), depth);
   return value;
 }

@@ -112,6 +112,12 @@ Experiment build(const Value& document, AskedKey* asked = nullptr) {
   constexpr const char* kGravity = "gravity_m_per_s2";  // downwards, or a vector in {I}
   c.gravity = root.isList(kGravity) ? Vec3(root.vector(kGravity, 3, -100.0, 100.0))
                                     : Vec3(0.0, 0.0, -root.number(kGravity, 0.0, 100.0));
+  if (c.gravity.z() > 0.0)
+    root.fail(
+        kGravity,
+        fmt::format("[{}] points up, and would have the platform hang from its base; Z is up, "
+                    "so that 9.81 is [0, 0, -9.81]",
+                    fmt::join(c.gravity, ", ")));
 
   readController(root.section("controller"), c);
   c.geometry = readGeometry(root.section("platform"));

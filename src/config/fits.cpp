@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "readers.hpp"
+#include "ves/control/motion_plan.hpp"
 #include "ves/control/path_checks.hpp"
 
 namespace ves {
@@ -88,6 +89,32 @@ void requireFiringsFit(Section& root, const ControllerConfig& c) {
     for (int k = 0; k < wheel.size; ++k)
       check("wheels", i, "torques_s_nm", wheel.torques[static_cast<std::size_t>(k)].on);
   }
+}
+
+std::string ProgramRehearsal::next(const Segment& s) {
+  const std::optional<Vec6> from = at_;
+  const bool moves = s.kind == SegmentKind::kMove;
+  const bool swings = std::any_of(s.trajectory.motion.begin(), s.trajectory.motion.end(),
+                                  [](AxisMotion m) { return m == AxisMotion::kSine; });
+  if (s.kind == SegmentKind::kAdmittance || s.kind == SegmentKind::kPath) at_.reset();
+  if (!moves && s.kind != SegmentKind::kTrajectory) return {};
+  if (moves) at_ = s.target.stacked();
+  if (!from && !moves) return {};
+  Check failure = Check::kCount;
+  if (from) {
+    const MotionPlan plan = MotionPlan::of({c_.periodSeconds(), c_.gentle}, s, atRest(*from));
+    if (!moves) at_ = swings ? std::nullopt : std::optional(plan.at(plan.steps(), {}).x);
+    const PathChecks checks(c_.safety, c_.geometry);
+    Rehearsal rehearsal;
+    rehearsal.begin(plan, legLengths(c_.geometry, c_.geometry.fromHome(Pose::from(*from))));
+    while (rehearsal.underWay()) rehearsal.advance(checks, c_.periodSeconds(), {});
+    failure = rehearsal.failure();
+  } else {
+    failure = Walk(c_, c_.periodSeconds()).go(*at_).first();
+  }
+  if (failure == Check::kCount) return {};
+  return fmt::format("the {} check would stop the run; want {}", name(failure),
+                     moves ? "a target nearer home, or more time" : "less of it, or slower");
 }
 
 /// Row by row, and from where the segment before it ends, where that is known.

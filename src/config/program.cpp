@@ -13,7 +13,8 @@ namespace {
 
 class ProgramReader {
  public:
-  explicit ProgramReader(Experiment& out) : out_(out), robot_(out) {}
+  explicit ProgramReader(Experiment& out)
+      : out_(out), robot_(out), rehearsal_(out.controller, out.plant.initial_pose) {}
 
   void read(Section& root) {
     const std::vector<Section> items = root.list("program");
@@ -35,6 +36,7 @@ class ProgramReader {
             std::find(keys.begin(), keys.end(), beside) != keys.end())
           inside.fail(beside, fmt::format("stands beside {}, not in it", kind));
       readSegment(inside, kind, segment);
+      if (const std::string why = rehearsal_.next(segment); !why.empty()) item.fail(kind, why);
       if (item.has("robot")) readRobotEvents(item);
       if (item.has("faults"))
         for (Section event : item.list("faults")) readFault(event);
@@ -74,6 +76,7 @@ class ProgramReader {
       move.kind = SegmentKind::kMove;
       move.duration = duration / kMoves;
       move.target = {Vec3::Zero(), tilt * way};
+      if (const std::string why = rehearsal_.next(move); !why.empty()) s.fail("tilt_deg", why);
       pass(move);
     }
   }
@@ -190,6 +193,7 @@ class ProgramReader {
 
   Experiment& out_;
   RobotEvents robot_;
+  ProgramRehearsal rehearsal_;
 };
 
 }  // namespace

@@ -100,6 +100,19 @@ void requireGroundFits(Section& root, const ControllerConfig& c);
 void requireFiringsFit(Section& root, const ControllerConfig& c);
 /// the recorded path: the steps between its rows, and to its first
 void requirePathFits(Section& root, const ControllerConfig& c);
+/// Goes through a program's moves and trajectories before it is run, where it is known from where.
+class ProgramRehearsal {
+ public:
+  /// `start` [m, rad] about home: where the platform is before the program.
+  ProgramRehearsal(const ControllerConfig& c, const Pose& start) : c_(c), at_(start.stacked()) {}
+
+  /// Why the next segment would be stopped; empty where it would not, or nobody knows.
+  std::string next(const Segment& segment);
+
+ private:
+  const ControllerConfig& c_;
+  std::optional<Vec6> at_;  // [m, rad] where the platform rests, where that is known
+};
 /// controller.moving_frame, with what it needs
 void requireFrameFits(Section& root, const ControllerConfig& c, const RobotTask& task);
 

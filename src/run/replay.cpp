@@ -153,12 +153,17 @@ class Replayer {
     if (result_.ticks == 0) controller_ = recorded.header.source;
     if (recorded.header.source != controller_) return;  // another one on the bus
     if (recorded.count != result_.ticks)
-      fail(result_.ticks == 0
-               ? fmt::format(
-                     "the log begins {} ticks after its controller; a replay needs the first",
-                     recorded.count)
-               : fmt::format("{} ticks before tick {} are missing", recorded.count - result_.ticks,
-                             recorded.header.sequence));
+      fail(
+          result_.ticks == 0
+              ? fmt::format(
+                    "the log begins {} ticks after its controller; a replay needs the first",
+                    recorded.count)
+          : recorded.count < result_.ticks
+              ? std::string(
+                    "another controller's run begins here (two logs put together?); a replay is of "
+                    "one")
+              : fmt::format("{} ticks before tick {} are missing", recorded.count - result_.ticks,
+                            recorded.header.sequence));
     TickInput in;
     in.tick = recorded.header.sequence;
     constexpr std::int64_t kMaxTime = INT64_MAX / 8;  // [ns]

@@ -113,6 +113,8 @@ inline constexpr QuantityMeaning kQuantities[] = {
     {"rest_acceleration", Per::kAcceleration, false, "the same of the acceleration"},
 };
 static_assert(std::size(kQuantities) == static_cast<std::size_t>(Quantity::kCount));
+/// The part of a test that measures it: sines, passes, steps; empty: all.
+const char* partOf(Quantity quantity) noexcept;
 
 /// One number. `of` is a coordinate's name, or leg_1..leg_6 in the test of z. SI; phase in rad.
 struct Measurement {
