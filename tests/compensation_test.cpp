@@ -493,7 +493,7 @@ TEST_F(Emulation, WhatIsLearntLeavesAFloatingBaseNoMomentum) {
 // Legs that move fast are further off, by what an update of their LegSlaves counts for; on a body
 // that floats what passes for a touch would stay for good.
 TEST_F(Emulation, LegsThatMoveFastAreNoTouch) {
-  for (const double mass : {300.0, 1000.0})
+  for (const double mass : {100.0, 300.0, 1000.0})
     for (const bool noise : {true, false}) {
       const Series series = run(experiment(
           "satellite_puma",
@@ -514,8 +514,10 @@ TEST_F(Emulation, LegsThatMoveFastAreNoTouch) {
       EXPECT_GT(fastest, 0.03);  // [m/s]
       const auto both = emulation(series);
       ASSERT_TRUE(both);
-      EXPECT_LT(distance(both->platform, both->base).rms_position,
-                0.01 * travel(both->base).peak_position);
+      // Felt as it was turned, and not as it is when that is read, which is 1.5 % off on 100 kg.
+      const Distance off = distance(both->platform, both->base), moved = travel(both->base);
+      EXPECT_LT(off.rms_position, 5e-4 * moved.peak_position) << mass;
+      EXPECT_LT(off.rms_attitude, 5e-4 * moved.peak_attitude) << mass;
     }
 }
 

@@ -36,7 +36,7 @@ void AdmittanceControl::begin(const Vec6& x, const Mat6& M_1, double age, double
     model_.reset(x, M_1, ahead_);
   }
   begins_ = true;
-  unknown_ = frame_.enabled() ? 2 : 1;
+  unknown_ = asShown() ? 2 : 1;
   shaken_ = 0.0;
   oscillation_.reset();
   port_.reset();

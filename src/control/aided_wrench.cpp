@@ -143,7 +143,7 @@ Wrench AidedWrench::update(const Input& in, bool engaged) noexcept {
   passing_ = closed_ <= hold_ ? passing_ + 1 : 0;
   lesson_.passing = passing_ > 0;
   (withholds_ ? lesson_.withheld : lesson_.passed) =
-      in.emulated.flies ? rotate(in.emulated.R_EI, beyond) : beyond;
+      in.emulated.apart ? rotate(in.emulated.R_EI, beyond) : beyond;
   return withholds_ ? in.measured - beyond : in.measured;
 }
 
@@ -193,13 +193,13 @@ void AidedWrench::take(const Input& in, const Mat6& counts_per_wrench,
   settled_ = true;
   const Vec6 felt = twist_.output().matrix();
   const JointVector &q = in.joints.q(), &q_dot = in.joints.q_dot();
-  if (in.emulated.flies)
+  if (in.emulated.apart)
     regressor_.evaluate(X_PL0_, gravity_,
                         {in.emulated.R_EP, in.emulated.v, in.emulated.w, q, q_dot},
                         lesson_.momentum, weight_);
   regressor_.evaluate(X_PL0_, gravity_, {in.X_IP.R, felt.head<3>(), felt.tail<3>(), q, q_dot},
                       momentum_, weight_);
-  if (!in.emulated.flies) lesson_.momentum = momentum_;
+  if (!in.emulated.apart) lesson_.momentum = momentum_;
   open_ = std::max(0, open_ - 1);
   doubts_ = std::max(0, doubts_ - 1);
   withholds_ = open_ == 0;

@@ -57,7 +57,7 @@ Emulated MovingFrame::emulated(const Mat3& R_IP) const noexcept {
   Emulated out;
   out.R_EP = R_IP;
   if (!settings_.enabled) return out;
-  out.flies = true;
+  out.apart = true;
   out.R_EI = E_H_.X.R;
   out.R_EP = out.R_EI * R_IP;
   return out;
@@ -65,7 +65,8 @@ Emulated MovingFrame::emulated(const Mat3& R_IP) const noexcept {
 
 Emulated MovingFrame::emulated(const Mat3& R_IP, const BodyMotion& E_P,
                                double since) const noexcept {
-  Emulated out = emulated(R_IP);
+  Emulated out;
+  out.apart = true;
   out.R_EP = rotationOf(since * E_P.w) * E_P.X.R;
   out.R_EI = out.R_EP * R_IP.transpose();
   out.v = E_P.v;

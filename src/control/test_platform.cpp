@@ -55,7 +55,7 @@ const TickState& TestPlatform::tick(const TickInput& in) noexcept {
     known_.learn(aided_.robot());
     bias_.learn(aided_.belief().bias());
   }
-  if (emulated.flies) W.felt = inE(emulated, W.felt);
+  if (emulated.apart) W.felt = inE(emulated, W.felt);
   if (!engaged) filter_.reset();
   W.dynamic = filter_.update(W.felt);
   safety_.watch(elapsed, samples_, load_.counts());
@@ -104,7 +104,7 @@ Waypoint<6> TestPlatform::nextMotion(const Wrenches& W) noexcept {
         aided_.withholds()
             ? Mat6(Mat6::Zero())
             : filter_.noise(wrenchNoise(config_.sensor, bias_.noise(), W.emulated.R_EP));
-    const Wrench at_port = W.emulated.flies ? rotate(W.emulated.R_EI.transpose(), W.felt) : W.felt;
+    const Wrench at_port = W.emulated.apart ? rotate(W.emulated.R_EI.transpose(), W.felt) : W.felt;
     return motion_.admittanceModel(
         {W.dynamic, at_port, noise, robot_.carried(joints_.emulatedMomentum()), share_.value(),
          samples_.wrench(), !aided_.withholds(), aided_.lesson(), sample.q, commander_.legs().L,

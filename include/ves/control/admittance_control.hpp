@@ -62,9 +62,10 @@ class AdmittanceControl {
   void forget() noexcept { oscillation_.reset(); }
 
   const MovingFrame& frame() const noexcept { return frame_; }
-  /// How a platform turned by R_IP is emulated; `since` [s]: of a wrench after the last step's.
+  /// How a platform turned by R_IP is emulated; `since` [s]: of a wrench after the last step's. The
+  /// wrench shows what floats as it was, and not as it is turned when it is read.
   Emulated emulated(const Mat3& R_IP, double since) const noexcept {
-    if (!frame_.enabled()) return frame_.emulated(R_IP);
+    if (!asShown()) return frame_.emulated(R_IP);
     Emulated out = frame_.emulated(R_IP, model_.atWrench(), since);
     out.v -= model_.letGo();
     return out;
@@ -78,6 +79,7 @@ class AdmittanceControl {
   double scale() const noexcept { return scale_; }  // [-] of the last step, 1: all of it was taken
 
  private:
+  bool asShown() const noexcept { return frame_.enabled() || (inertia_ && model_.floats()); }
   void slowInsideEnvelope(const PathPoint<6>& last, const Vec6& L,
                           const PathChecks& checks) noexcept;
 

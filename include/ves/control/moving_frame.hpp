@@ -25,9 +25,9 @@ namespace ves {
 /// How the platform is emulated to be, as the newest wrench shows it.
 struct Emulated {
   Mat3 R_EP = Mat3::Identity();
-  bool flies = false;  // the laboratory does; without, E is I, and nothing more is said
+  bool apart = false;  // from the platform as it stands; without, E is I, and nothing more is said
   Mat3 R_EI = Mat3::Identity();
-  // [m/s], [rad/s] of Po and P in E, where it flies: beside what the vehicle was let go with.
+  // [m/s], [rad/s] of Po and P in E, where it is apart: beside what the vehicle was let go with.
   Vec3 v = Vec3::Zero(), w = Vec3::Zero();
 };
 

@@ -162,6 +162,8 @@ class AdmittanceModel {
   ModalDynamics::Body body(const Mat6& M_1) const noexcept {
     return each([&](const auto& v) { return v.body(M_1); });
   }
+  /// Its attitude is one of its own, and no small angles.
+  bool floats() const noexcept { return std::holds_alternative<FreeBody>(kind_); }
   /// [m/s] Of Po, that it begins with.
   Vec3 letGo() const noexcept {
     return each([](const auto& v) -> Vec3 { return v.letGo(); });
