@@ -48,7 +48,7 @@ std::filesystem::path findCalibration(ControllerOptions& options) {
   if (record.setup == options.load().source.calibrated)
     options.belief.calibration = kept;
   else
-    fmt::print(stderr, "warning: {} is of another sensor, robot or gravity: not used\n",
+    fmt::print(stderr, "warning: {} is of another sensor, robot, masses or gravity: not used\n",
                kept.string());
   return kept;
 }
@@ -87,9 +87,10 @@ int controllerCommand(int argc, char** argv) {
   options.addForce(cli);
   options.addBus(cli);
   options.addOut(cli);
-  cli.add_option("--do", options.commands,
-                 "a line of the menu, as 'trajectory 3 z sine 200 0.5'; again for the next, which waits "
-                 "until it is over, unless it ends in & ('admittance 10 &'); then home")
+  cli.add_option(
+         "--do", options.commands,
+         "a line of the menu, as 'trajectory 3 z sine 200 0.5'; again for the next, which waits "
+         "until it is over, unless it ends in & ('admittance 10 &'); then home")
       ->allow_extra_args(false);
   cli.add_flag("--plant", options.plant, "start a plant too");
   cli.add_flag("--start", options.process.start, "run the scenario's program at once; no menu");

@@ -109,6 +109,11 @@ TEST_F(OnATerminal, TheMenuShowsWhereThePlatformIsWhileAPersonTypes) {
   EXPECT_NEAR(there, 5.0, 0.11);
   EXPECT_GT(later, t + 1.0);
   EXPECT_LT(later, t + 60.0);
+  // A sine that ends in motion is braked, which is no move.
+  person.type("trajectory 0.3 z sine 20 0.5\n");
+  person.until("running: trajectory");
+  person.until("running: braking");
+  person.until("holding");
   // What is not understood, or not taken, is told, and the menu goes on.
   person.type("dance\n");
   person.until("dance");

@@ -266,9 +266,10 @@ Experiment build(const Value& document, AskedKey* asked = nullptr) {
     Section section = root.section("calibration");
     out.source.calibration = readCalibration(section);
     if (out.source.calibration->setup != out.source.calibrated)
-      section.fail("setup", fmt::format("{} is of another sensor, robot or gravity, want {}; "
-                                        "calibrate again",
-                                        out.source.calibration->setup, out.source.calibrated));
+      section.fail("setup",
+                   fmt::format("{} is of another sensor, robot, masses or gravity, want {}; "
+                               "calibrate again",
+                               out.source.calibration->setup, out.source.calibrated));
     c.bias = out.source.calibration->bias;
   }
 

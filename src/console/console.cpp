@@ -133,6 +133,9 @@ class Console {
     const auto phase = static_cast<Phase>(s.phase);
     const auto kind = static_cast<SegmentKind>(s.kind);
     if (phase != phase_ || kind != kind_ || s.segment != segment_) {
+      // What follows a segment within it is how it comes to rest.
+      const bool brakes = kind == SegmentKind::kMove && phase == phase_ && s.segment == segment_;
+      const std::string_view what = brakes ? "braking" : name(kind);
       phase_ = phase;
       kind_ = kind;
       segment_ = s.segment;
@@ -142,8 +145,8 @@ class Console {
           break;
         case Phase::kArmed: say("holding  " + poseText(s.x)); break;
         case Phase::kRunning:
-          say(s.segment < 0 ? fmt::format("running: {}", name(kind))
-                            : fmt::format("running: {} ({} of {})", name(kind), s.segment + 1,
+          say(s.segment < 0 ? fmt::format("running: {}", what)
+                            : fmt::format("running: {} ({} of {})", what, s.segment + 1,
                                           experiment_.controller.program.size));
           break;
         case Phase::kReturning: say("going home"); break;

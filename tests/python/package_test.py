@@ -240,8 +240,9 @@ class Experiments(unittest.TestCase):
         self.assertLess(len(run["t_s"]), 400)
 
     def test_a_stopped_run_names_its_check(self):
-        run = ves.run("z_sine", {"safety.leg_velocity_m_per_s": 0.01})
-        self.assertEqual((run.phase, run.cause), ("stopped", "velocity"))
+        button = {"at_s": 0.5, "duration_s": 9, "fault": "panic_button"}
+        run = ves.run("z_sine", {"program": [{"move": {"duration_s": 3}, "faults": [button]}]})
+        self.assertEqual((run.phase, run.cause), ("stopped", "panic button"))
 
 
 class Refusals(unittest.TestCase):
