@@ -119,6 +119,7 @@ Wrench AidedWrench::update(const Input& in, bool engaged) noexcept {
   hand_moved_ = hand_moved_ || in.gripper;  // also where nothing is learnt yet
   if (!engaged) {
     restart();
+    leg_speed_.setZero();
     settled_ = false;
     open_ = 0;
     residuals_ = 0;
