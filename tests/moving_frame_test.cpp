@@ -366,6 +366,23 @@ TEST(Flight, ATripLeavesWhatFloatsWhereItWasBesideTheTool) {
   EXPECT_EQ(loop.state().phase, Phase::kStopped);
 }
 
+// Without a laboratory that flies the platform is at its limits soon, and noise pushes it along
+// them, and a little beyond where braking would lead back.
+TEST(Envelope, HoldsWhatDriftsAlongALimit) {
+  for (const auto& [seed, period] : {std::pair(1, 13333333), std::pair(5, 10000000)}) {
+    const RecordedRun run = recordLockstep(test::experiment(
+        "satellite_tumbling",
+        {"controller.moving_frame.enabled=false", "controller.compensation.inertia=false",
+         "controller.compensation.observer=false", "controller.compensation.feed_forward=false",
+         "controller.compensation.wrench=raw", fmt::format("seed={}", seed),
+         fmt::format("controller.period_ns={}", period)}));
+    EXPECT_TRUE(run.result.good()) << seed << ": " << name(run.result.cause);
+    double least = 1.0;
+    for (const Row& row : run.series.rows) least = std::min(least, row.state.envelope_scale);
+    EXPECT_LT(least, 0.5);
+  }
+}
+
 TEST(Flight, TheLaboratoryRestsWhereNothingIsEmulated) {
   const RecordedRun run = recordLockstep(test::experiment(
       "satellite_tumbling",

@@ -6,6 +6,25 @@
 #include "ves/control/motion_plan.hpp"
 
 namespace ves {
+namespace {
+
+constexpr double kStraight = 1e-4;  // [m, rad] what a gentle acceleration does in a period
+
+/// Limits that a pose within keeps away from by more than what kStraight may change.
+SafetyLimits inside(SafetyLimits limits) {
+  constexpr double kMargin = 5.0 * kStraight;  // [m, rad] of a leg, of an angle at its ends
+  limits.translation -= kMargin;
+  limits.rotation -= kMargin;
+  limits.leg_min += kMargin;
+  limits.leg_max -= kMargin;
+  limits.joint_cone -= kMargin;
+  limits.leg_clearance += kMargin;
+  limits.plate_angle += kMargin;
+  limits.condition *= 1.0 - 10.0 * kMargin;
+  return limits;
+}
+
+}  // namespace
 
 AdmittanceControl::AdmittanceControl(const ControllerConfig& config)
     : model_(config.vehicle, config.periodSeconds()),
@@ -20,7 +39,8 @@ AdmittanceControl::AdmittanceControl(const ControllerConfig& config)
       period_(config.periodSeconds()),
       joint_moves_(config.stillness.joint),
       braking_(config.gentle.braking),
-      slow_(std::min(config.safety.leg_velocity, config.safety.flow / config.safety.bore_area)) {
+      slow_(std::min(config.safety.leg_velocity, config.safety.flow / config.safety.bore_area)),
+      inside_(inside(config.safety), config.geometry) {
   constexpr double kTurns = 2.0;  // [-] angular velocity per rates of the fixed angles, at most
   for (const Vec3& joint : config.geometry.p_PPi_P)
     reach_ = std::max(reach_, kTurns * joint.norm());
@@ -98,16 +118,19 @@ void AdmittanceControl::slowInsideEnvelope(const PathPoint<6>& from, const Vec6&
                                            const PathChecks& checks) noexcept {
   const Geometry& geometry = checks.geometry();
   const Vec6 last = from.x, step = shown_.x - last, rate = shown_.x_dot;
-  constexpr double kStraight = 1e-4;  // [m, rad] what a gentle acceleration does in a period
   const auto fits = [&](double scale) {
     const Vec6 v = scale * rate;  // that a braking motion would begin with
     const double brake_time = brakeTime(v, braking_);
     const Pose next = Pose::from(last + scale * step);
     const Pose rest = Pose::from(last + scale * step + 0.5 * brake_time * v);
     const Transform X_rest = geometry.fromHome(rest);
-    const Vec6 L_next = legLengths(geometry, geometry.fromHome(next));
-    if (checks.pose(X_rest, rest, legLengths(geometry, X_rest)).any() ||
-        checks.step(L_next, L, period_).any())
+    const Vec6 L_next = legLengths(geometry, geometry.fromHome(next)),
+               L_rest = legLengths(geometry, X_rest);
+    if (checks.step(L_next, L, period_).any()) return false;
+    // Near a limit the next pose may be beyond it, though braking leads back.
+    if (inside_.pose(X_rest, rest, L_rest).any() &&
+        (checks.pose(X_rest, rest, L_rest).any() ||
+         checks.pose(geometry.fromHome(next), next, L_next).any()))
       return false;
     // Where the rate leads elsewhere than the step did, between the two.
     const bool turns = !((scale * step - period_ * v).norm() <= kStraight);

@@ -102,6 +102,7 @@ class AdmittanceControl {
   double joint_moves_;  // [rad | m] what counts as a motion of the robot
   Braking braking_;     // before the limits
   double slow_;         // [m/s] no leg of such a speed is too fast
+  PathChecks inside_;   // a little inside the limits
   double reach_ = 0.0;  // [m] of a leg's joint per rate of the fixed angles, at most
   double scale_ = 1.0;
 };
