@@ -94,8 +94,6 @@ void requireFiringsFit(Section& root, const ControllerConfig& c) {
 std::string ProgramRehearsal::next(const Segment& s) {
   const std::optional<Vec6> from = at_;
   const bool moves = s.kind == SegmentKind::kMove;
-  const bool swings = std::any_of(s.trajectory.motion.begin(), s.trajectory.motion.end(),
-                                  [](AxisMotion m) { return m == AxisMotion::kSine; });
   if (s.kind == SegmentKind::kAdmittance || s.kind == SegmentKind::kPath) at_.reset();
   if (!moves && s.kind != SegmentKind::kTrajectory) return {};
   if (moves) at_ = s.target.stacked();
@@ -103,7 +101,7 @@ std::string ProgramRehearsal::next(const Segment& s) {
   Check failure = Check::kCount;
   if (from) {
     const MotionPlan plan = MotionPlan::of({c_.periodSeconds(), c_.gentle}, s, atRest(*from));
-    if (!moves) at_ = swings ? std::nullopt : std::optional(plan.at(plan.steps(), {}).x);
+    if (!moves) at_ = plan.swings() ? std::nullopt : std::optional(plan.at(plan.steps(), {}).x);
     const PathChecks checks(c_.safety, c_.geometry);
     Rehearsal rehearsal;
     rehearsal.begin(plan, legLengths(c_.geometry, c_.geometry.fromHome(Pose::from(*from))));
