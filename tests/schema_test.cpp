@@ -547,8 +547,8 @@ class Describe : public test::Programs {
     });
     EXPECT_EQ(*line, "}");
     for (const std::string qualifier : {"", "const "})
-      EXPECT_NE(values.find("inline auto values(" + qualifier + message.name +
-                            "& m) { return std::tie(" + list + "); }\n"),
+      EXPECT_NE(values.find("void values(" + qualifier + message.name + "& m, auto&& f) { f(" +
+                            list + "); }\n"),
                 std::string::npos)
           << message.name;
     EXPECT_NE(values.find("#include <ves/" + std::string(message.name) + ".hpp>\n"),

@@ -106,8 +106,8 @@ struct Out {
     });
     lcm << "}\n";
     for (const char* qualifier : {"", "const "})
-      values << "inline auto values(" << qualifier << message.name << "& m) { return std::tie("
-             << list << "); }\n";
+      values << "void values(" << qualifier << message.name << "& m, auto&& f) { f(" << list
+             << "); }\n";
   }
 };
 
@@ -115,7 +115,7 @@ int describe(const std::string& folder) {
   Out out{folder, std::ofstream(folder + "/ves/values.hpp"),
           std::ofstream(folder + "/messages.md")};
   out.values << "// The fields of the messages, in the order of contract/schema.hpp.\n"
-                "#pragma once\n\n#include <tuple>\n\n";
+                "#pragma once\n\n";
   for (const char* name :
        {kMessage<Sample>.name, kMessage<LegCommand>.name, kMessage<MachineSetup>.name,
         kMessage<Order>.name, kMessage<TickState>.name})

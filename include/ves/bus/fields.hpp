@@ -31,14 +31,12 @@ struct MirrorOf<state_t> : std::type_identity<TickState> {};
 /// Calls f(field, value) for every field of a struct and its value in the message.
 template <typename Struct, typename Message, typename F>
 void forEachPair(Struct& s, Message& m, F f) {
-  const auto described = schema::fields(s);
-  const auto in_message = values(m);
-  constexpr std::size_t kFields = std::tuple_size_v<decltype(described)>;
-  static_assert(kFields == std::tuple_size_v<decltype(in_message)>);
-  [&]<std::size_t... i>(std::index_sequence<i...>) {
-    (f(std::get<i>(described), std::get<i>(in_message)), ...);
-  }
-  (std::make_index_sequence<kFields>());
+  schema::fields(s, [&](const auto&... field) {
+    values(m, [&](auto&... value) {
+      static_assert(sizeof...(field) == sizeof...(value));
+      (f(field, value), ...);
+    });
+  });
 }
 
 /// Calls f(name, value) for every field of a message but its header; lists are arrays.

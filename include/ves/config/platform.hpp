@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "ves/analysis/platform.hpp"
+#include "ves/plant/actuator.hpp"
+#include "ves/plant/leg_slave.hpp"
 
 namespace ves {
 

@@ -4,6 +4,8 @@
 // the joints stand. The controller's model of both.
 #pragma once
 
+#include <optional>
+
 #include "ves/control/controller_config.hpp"
 #include "ves/control/tick_clock.hpp"
 #include "ves/math/butterworth.hpp"

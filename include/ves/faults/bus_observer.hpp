@@ -3,10 +3,12 @@
 // What is heard of legs and controllers on a bus, by a process that only listens.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 
 #include "ves/bus/bus.hpp"
+#include "ves/control/safety_limits.hpp"
 
 namespace ves {
 
