@@ -11,6 +11,7 @@
 #include "ves/bus/ordered_log.hpp"
 #include "ves/core/build.hpp"
 #include "ves/evaluation/let_go.hpp"
+#include "ves/export/parquet.hpp"
 #include "ves/export/ros2.hpp"
 #include "ves/run/follow_bus.hpp"
 #include "ves/series/series.hpp"
@@ -21,17 +22,41 @@ namespace {
 
 int writeMcap(const Series& series, const std::string& log, const std::string& file) {
   const std::optional<Emulation> both = emulation(series);
-  const auto poses = both ? basePoses(series, both->base) : std::map<std::int64_t, Vec6>();
+  const BasePoses poses = both ? basePoses(series, both->base) : BasePoses();
   McapExport out(series.experiment, series.version.empty() ? describeBuild() : series.version, file,
-                 [&](const Row& row) {
-                   const auto at = poses.find(row.state.header.sequence);
-                   return at == poses.end() ? std::nullopt : std::optional<Vec6>(at->second);
-                 });
+                 [&](const Row& row) { return at(poses, row.state); });
   Damage damage;  // told with the series
   OrderedLog reader(log, &damage);
   for (LogEvent event; reader.next(event);) out.add(event);
   out.finish();
   return kDone;
+}
+
+/// The rows that are asked for, one after the other.
+template <typename F>
+void eachRow(const Series& series, double from, double duration, double rate, F f) {
+  double next = from;
+  for (const Row& row : series.rows) {
+    // Half a nanosecond: times are whole nanoseconds in seconds.
+    if (row.t < next - 0.5e-9 || row.t > from + duration) continue;
+    if (rate > 0.0) next += 1.0 / rate;
+    f(row);
+  }
+}
+
+ParquetWriter tableOf(const Series& series, const std::vector<Column>& columns,
+                      const std::string& file) {
+  std::vector<ParquetWriter::Column> of;
+  for (const Column& column : columns) of.push_back({column.name, column.text != nullptr});
+  return {file, of, {{"ves", series.version}, {"experiment", series.experiment.name}}};
+}
+
+void addRow(const std::vector<Column>& columns, const Row& row, ParquetWriter& out) {
+  for (const Column& column : columns)
+    if (column.text)
+      out.add(column.text(row));
+    else
+      out.add(column.value(row));
 }
 
 /// The run on the bus as it happens.
@@ -61,7 +86,7 @@ int followIntoMcap(const std::string& url, const std::string& file) {
 int collectCommand(int argc, char** argv) {
   CLI::App cli("Takes variables out of a log, as CSV with the unit in every column's name.",
                "ves collect");
-  std::string log, out, mcap, scenario, url = kDefaultUrl, join;
+  std::string log, out, mcap, parquet, scenario, url = kDefaultUrl, join;
   bool follow = false;
   std::vector<std::string> select;
   bool list = false;
@@ -75,6 +100,7 @@ int collectCommand(int argc, char** argv) {
   cli.add_option("--from", from, "[s] since the first tick")->check(inRange(0.0, 1e9));
   cli.add_option("--duration", duration, "[s]; to the end by default")->check(inRange(0.0, 1e9));
   cli.add_option("--out", out, "file; standard output by default");
+  cli.add_option("--parquet", parquet, "the same table as a Parquet file, for pandas and others");
   cli.add_option("--mcap", mcap, "everything into this MCAP file for Foxglove, PlotJuggler, Rerun");
   cli.add_flag("--follow", follow, "the run on the bus instead of a log, with --mcap");
   addScenarioOfLog(cli, scenario);
@@ -100,6 +126,14 @@ int collectCommand(int argc, char** argv) {
     if (!series.rows.empty() && from > series.rows.back().t)
       throw InputError(fmt::format("--from {}: the log ends at {} s", from, series.rows.back().t));
 
+    if (!parquet.empty()) {
+      if (list || !out.empty()) throw InputError("--parquet: want no --out and no --list with it");
+      requireReplaceable("--parquet", parquet, "PAR1");
+      ParquetWriter table = tableOf(series, chosen, parquet);
+      eachRow(series, from, duration, rate, [&](const Row& row) { addRow(chosen, row, table); });
+      table.finish();
+      return kDone;
+    }
     std::ofstream file;
     if (!out.empty()) {
       requireReplaceable("--out", out, "t_s");
@@ -112,13 +146,8 @@ int collectCommand(int argc, char** argv) {
         to << fmt::format("{:<36} {}\n", column.name, column.meaning);
     } else {
       to << csvHeader(chosen) << "\n";
-      double next = from;
-      for (const Row& row : series.rows) {
-        // Half a nanosecond: times are whole nanoseconds in seconds.
-        if (row.t < next - 0.5e-9 || row.t > from + duration) continue;
-        if (rate > 0.0) next += 1.0 / rate;
-        to << csvRow(chosen, row) << "\n";
-      }
+      eachRow(series, from, duration, rate,
+              [&](const Row& row) { to << csvRow(chosen, row) << "\n"; });
     }
     to.flush();
     if (!to)

@@ -6,6 +6,7 @@
 #include "commands.hpp"
 #include "runner.hpp"
 #include "ves/config/keys.hpp"
+#include "ves/export/parquet.hpp"
 #include "ves/sweep/sweep.hpp"
 
 namespace ves::app {
@@ -53,6 +54,63 @@ bool takesOnlyWhole(const AskedKey& asked, const std::string& key) {
   return at->kinds == AskedKey::kInteger;
 }
 
+/// The rows of a table, beside it. Columns are numbers where every field is one, or empty.
+std::filesystem::path writeParquet(const std::filesystem::path& csv, const std::string& plan) {
+  const auto eachLine = [&](const std::function<void(const std::vector<std::string>&)>& f) {
+    std::ifstream in(csv);
+    for (std::string line; std::getline(in, line);) f(csvFields(line));
+  };
+  const auto number = [](const std::string& field) {
+    char* end = nullptr;
+    const double x = std::strtod(field.c_str(), &end);
+    return field.empty() || *end ? std::nullopt : std::optional(x);
+  };
+  std::vector<ParquetWriter::Column> columns;
+  eachLine([&](const std::vector<std::string>& fields) {
+    const bool header = columns.empty();
+    for (std::size_t i = 0; i < fields.size(); ++i)
+      if (header)
+        columns.push_back({fields[i]});
+      else if (!fields[i].empty() && !number(fields[i]))
+        columns[i].words = true;
+  });
+  std::filesystem::path file = csv;
+  file.replace_extension(".parquet");
+  ParquetWriter out(file.string(), columns, {{"ves", describeBuild()}, {"sweep", plan}});
+  bool header = true;
+  eachLine([&](const std::vector<std::string>& fields) {
+    for (std::size_t i = 0; i < fields.size() && !header; ++i)
+      if (fields[i].empty())
+        out.add();
+      else if (columns[i].words)
+        out.add(fields[i]);
+      else
+        out.add(*number(fields[i]));
+    header = false;
+  });
+  out.finish();
+  return file;
+}
+
+/// What is wrong with the first and the last run is told before hours have passed. A motion that
+/// a check would stop is a row's own matter, unless both have one. The scenario's name.
+std::string requireRuns(const SweepPlan& plan, const SweepOptions& options) {
+  std::string name, stopped;
+  for (const std::int64_t run : {std::int64_t{0}, plan.subset() ? 0 : plan.size() - 1}) {
+    Value document = loadDocument(options.scenario);
+    for (const std::string& set : options.overrides) applyOverride(document, set);
+    plan.put(plan.overrides(run), document);
+    try {
+      name = buildExperiment(std::move(document), {}).name;
+    } catch (const WouldStop& error) {
+      stopped = fmt::format("run {}: {}", run, error.what());
+    }
+  }
+  if (name.empty()) throw InputError(stopped);
+  if (!stopped.empty()) fmt::print(stderr, "{}; its row says so\n", stopped);
+  return name;
+}
+
 }  // namespace
 
 int sweepCommand(int argc, char** argv) {
@@ -64,6 +122,7 @@ int sweepCommand(int argc, char** argv) {
       "ves sweep");
   std::string scenario, out, figure;
   double until = 0.0;
+  bool parquet = false;
   const std::vector<std::string> designs = {"uniform", "latin", "sobol", "subset"};
   std::string laid = designs.front();
   std::vector<std::string> sets, vary, draw;
@@ -94,6 +153,7 @@ int sweepCommand(int argc, char** argv) {
   cli.add_option("--set", sets, "KEY.PATH=VALUE of every run")->allow_extra_args(false);
   addWorkers(cli, workers, "runs at a time");
   cli.add_option("--out", out, "folder; ves-runs/sweep-SCENARIO by default");
+  cli.add_flag("--parquet", parquet, "sweep.parquet beside sweep.csv, for pandas and others");
   return run(cli, argc, argv, [&, rank = rank, ranks = ranks] {
     SweepPlan plan;
     for (const std::string& option : vary) plan.vary(option);
@@ -120,14 +180,8 @@ int sweepCommand(int argc, char** argv) {
       plan.drawWhole([asked = askedOf(options.scenario, sets)](const std::string& key) {
         return takesOnlyWhole(asked, key);
       });
-    // What is wrong with the first and the last is told before hours have passed.
-    for (const std::int64_t run : {std::int64_t{0}, plan.subset() ? 0 : plan.size() - 1}) {
-      Value document = loadDocument(options.scenario);
-      for (const std::string& set : sets) applyOverride(document, set);
-      plan.put(plan.overrides(run), document);
-      const Experiment e = buildExperiment(std::move(document), {});
-      if (out.empty()) out = "ves-runs/sweep-" + e.name;
-    }
+    const std::string name = requireRuns(plan, options);
+    if (out.empty()) out = "ves-runs/sweep-" + name;
     requireFigure(plan, options);
     options.file = makeFolder(out) / "sweep.csv";
     catchSignals();
@@ -153,6 +207,7 @@ int sweepCommand(int argc, char** argv) {
     fmt::print("{} runs{}\n{}\n", result.rows,
                result.not_good ? fmt::format(", {} of them not to their end", result.not_good) : "",
                options.file.string());
+    if (parquet) fmt::print("{}\n", writeParquet(options.file, plan.text()).string());
     if (result.figure) {
       const Figure::Estimate& f = *result.figure;
       const char* none =

@@ -262,6 +262,16 @@ struct Bad {
 };
 std::ostream& operator<<(std::ostream& out, const Bad& bad) { return out << bad.name; }
 
+TEST(Config, WhereRealLegsStandIsKnownOnceTheyHaveMoved) {
+  const auto load = [](const std::string& program) {
+    loadExperiment(scenarios() / "z_sine.yaml", {"machine.legs=external", "program=" + program});
+  };
+  EXPECT_NO_THROW(load("[{move: {duration_s: 0.1, to: {z_m: 0.2}}}]"));
+  for (const char* known : {"[{move: {}}, {move: {duration_s: 0.1, to: {z_m: 0.2}}}]",
+                            "[{move: {duration_s: 60, to: {z_m: 0.5}}}]"})
+    EXPECT_THROW(load(known), WouldStop) << known;
+}
+
 class BadValue : public testing::TestWithParam<Bad> {};
 
 TEST_P(BadValue, IsRefusedByName) {

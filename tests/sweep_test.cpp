@@ -438,6 +438,27 @@ TEST_F(Sweep, SaysInTheRowWhatCouldNotRun) {
   EXPECT_EQ(rows(folder_ / "t/sweep.csv").at(0).at("ended"), "aborted");
 }
 
+TEST_F(Sweep, AMotionThatACheckWouldStopIsARow) {
+  const test::Output o = sweep("z_sine --vary safety.translation_m=0.1,0.3" + out("s"));
+  ASSERT_EQ(o.status, 0) << o.text;
+  EXPECT_NE(o.text.find("run 0: "), std::string::npos) << o.text;
+  const auto all = rows(folder_ / "s/sweep.csv");
+  EXPECT_EQ(all.at(0).at("ended"), "refused");
+  EXPECT_NE(csv("s").find("motion limits check would stop the run"), std::string::npos);
+  EXPECT_EQ(all.at(1).at("ended"), "parked");
+}
+
+TEST(Csv, AFieldIsReadAsItWasWritten) {
+  for (const std::string text : {"", "1", "a,b", "say \"no\"", "\"\"", ",", "a\"b,\"c"}) {
+    const std::vector<std::string> fields =
+        csvFields(csvField("x,y") + "," + csvField(text) + "," + csvField("z"));
+    ASSERT_EQ(fields.size(), 3u) << text;
+    EXPECT_EQ(fields[0], "x,y");
+    EXPECT_EQ(fields[1], text);
+    EXPECT_EQ(fields[2], "z");
+  }
+}
+
 TEST_F(Sweep, RefusesByName) {
   const auto refused = [&](const std::string& arguments, const std::string& line) {
     const test::Output o = sweep(arguments);
@@ -472,6 +493,7 @@ TEST_F(Sweep, RefusesByName) {
   refused(drawn + "--runs 100 --vary seed=1,2 --figure 'seed>1'" + out("s"), "want no --vary");
   refused("z_sine --vary legs.K_Q=1,2" + out("s"), "--vary legs.K_Q=1:1: legs.K_Q: unknown key");
   refused("z_sine --draw legs.K_Q=1:2 --runs 2" + out("s"), "ves sweep: --draw legs.K_Q=1.");
+  refused("z_sine --vary safety.translation_m=0.1,0.11" + out("s"), "motion limits check would");
   refused("z_sine --vary legs.K_P=1,-2" + out("s"), "legs.K_P: '-2'");  // the last one, too
   refused("nothing --vary legs.K_P=1,2" + out("s"), "nothing");
   refused("z_sine --vary legs.K_P=1,2 --workers 0" + out("s"), "--workers");

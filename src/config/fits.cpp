@@ -57,7 +57,7 @@ void requireGroundFits(Section& root, const ControllerConfig& c) {
     const Pose x = Pose::from(ground.at(i * kStep).x);
     const Tripped t = walk.go(x.stacked());
     if (t.any())
-      root.section("base").fail(
+      root.section("base").failOfMotion(
           "ground", fmt::format("after {:.2f} s it is at {:.3f} {:.3f} {:.3f} m, {:.1f} {:.1f} "
                                 "{:.1f} deg, and the {} check would stop the run; want less of it",
                                 i * kStep, x.p.x(), x.p.y(), x.p.z(), x.rpy.x() / kDegree,
@@ -120,7 +120,7 @@ void requirePathFits(Section& root, const ControllerConfig& c) {
   if (c.path.cols() == 0) return;
   const auto refuse = [&](const std::string& why) {
     for (Section& item : root.list("program"))
-      if (item.has("path")) item.section("path").fail("rows_m_deg", why);
+      if (item.has("path")) item.section("path").failOfMotion("rows_m_deg", why);
   };
   std::optional<Vec6> before;
   for (int i = 0; i < c.program.size; ++i) {

@@ -14,7 +14,7 @@ namespace {
 class ProgramReader {
  public:
   explicit ProgramReader(Experiment& out)
-      : out_(out), robot_(out), rehearsal_(out.controller, out.plant.initial_pose) {}
+      : out_(out), robot_(out), rehearsal_(out.controller, startOf(out)) {}
 
   void read(Section& root) {
     const std::vector<Section> items = root.list("program");
@@ -36,7 +36,8 @@ class ProgramReader {
             std::find(keys.begin(), keys.end(), beside) != keys.end())
           inside.fail(beside, fmt::format("stands beside {}, not in it", kind));
       readSegment(inside, kind, segment);
-      if (const std::string why = rehearsal_.next(segment); !why.empty()) item.fail(kind, why);
+      if (const std::string why = rehearsal_.next(segment); !why.empty())
+        item.failOfMotion(kind, why);
       if (item.has("robot")) readRobotEvents(item);
       if (item.has("faults"))
         for (Section event : item.list("faults")) readFault(event);
@@ -76,7 +77,8 @@ class ProgramReader {
       move.kind = SegmentKind::kMove;
       move.duration = duration / kMoves;
       move.target = {Vec3::Zero(), tilt * way};
-      if (const std::string why = rehearsal_.next(move); !why.empty()) s.fail("tilt_deg", why);
+      if (const std::string why = rehearsal_.next(move); !why.empty())
+        s.failOfMotion("tilt_deg", why);
       pass(move);
     }
   }
@@ -189,6 +191,11 @@ class ProgramReader {
     }
     s.finish();
     out_.plant.faults.push_back(event);
+  }
+
+  /// Real legs stand where they stand.
+  static std::optional<Pose> startOf(const Experiment& e) {
+    return e.machine.external_legs ? std::nullopt : std::optional(e.plant.initial_pose);
   }
 
   Experiment& out_;

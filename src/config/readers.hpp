@@ -103,8 +103,10 @@ void requirePathFits(Section& root, const ControllerConfig& c);
 /// Goes through a program's moves and trajectories before it is run, where it is known from where.
 class ProgramRehearsal {
  public:
-  /// `start` [m, rad] about home: where the platform is before the program.
-  ProgramRehearsal(const ControllerConfig& c, const Pose& start) : c_(c), at_(start.stacked()) {}
+  /// `start` [m, rad] about home: where the platform is before the program; none: nobody knows.
+  ProgramRehearsal(const ControllerConfig& c, const std::optional<Pose>& start) : c_(c) {
+    if (start) at_ = start->stacked();
+  }
 
   /// Why the next segment would be stopped; empty where it would not, or nobody knows.
   std::string next(const Segment& segment);

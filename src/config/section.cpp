@@ -262,6 +262,14 @@ void Section::fail(std::string_view key, const std::string& what) const {
          what);
 }
 
+void Section::failOfMotion(std::string_view key, const std::string& what) const {
+  try {
+    fail(key, what);
+  } catch (const InputError& error) {
+    throw WouldStop(error.what());
+  }
+}
+
 void Section::failAt(const Value& at, const std::string& path, const std::string& what) const {
   throw InputError(fmt::format("{}:{}: {}{}{}", at.file ? *at.file : "?", at.line, path,
                                path.empty() ? "" : ": ", what));

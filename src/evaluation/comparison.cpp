@@ -87,22 +87,26 @@ Amplitude amplitude(const Experiment& experiment, const Motion& base) {
 }
 
 std::vector<Column> columnsOf(const Series& series, const Emulation& emulation) {
-  const auto at =
-      std::make_shared<const std::map<std::int64_t, Vec6>>(basePoses(series, emulation.base));
+  const auto poses = std::make_shared<const BasePoses>(basePoses(series, emulation.base));
   std::vector<Column> out;
   for (int i = 0; i < 6; ++i)
     out.push_back({fmt::format("{}_base_{}", coordinate(i).name, coordinate(i).unit),
-                   [at, i](const Row& row) {
-                     const auto found = at->find(row.state.header.sequence);
-                     return found == at->end() ? NAN : found->second(i);
+                   [poses, i](const Row& row) {
+                     const auto x = at(*poses, row.state);
+                     return x ? (*x)(i) : NAN;
                    },
                    "of the base in free space, let go where the platform was",
                    {}});
   return out;
 }
 
-std::map<std::int64_t, Vec6> basePoses(const Series& series, const Motion& base) {
-  std::map<std::int64_t, Vec6> out;
+std::optional<Vec6> at(const BasePoses& poses, const state_t& state) {
+  const auto found = poses.find(state.header.sequence);
+  return found == poses.end() ? std::nullopt : std::optional(found->second);
+}
+
+BasePoses basePoses(const Series& series, const Motion& base) {
+  BasePoses out;
   std::optional<std::int64_t> first;
   eachTick(series, [&](const Row& row, double) {
     const std::int64_t tick = row.state.header.sequence;

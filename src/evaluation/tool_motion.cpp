@@ -16,15 +16,15 @@ std::optional<ToolMotion> toolMotion(const Series& series, const std::optional<E
   const Experiment& experiment = series.experiment;
   if (!e || !experiment.robot.tool()) return {};
   ToolMotion out;
-  const std::map<std::int64_t, Vec6> base = basePoses(series, e->base);
+  const BasePoses base = basePoses(series, e->base);
   const Vec6& start = e->base.x.front();
   eachTick(series, [&](const Row& row, double) {
-    const auto at = base.find(row.state.header.sequence);
-    if (!row.hasTruePose() || at == base.end()) return;
+    const auto x = at(base, row.state);
+    if (!row.hasTruePose() || !x) return;
     const JointVector q = JointVector::Map(row.truth.q);
-    out.tick.push_back(at->first);
+    out.tick.push_back(row.state.header.sequence);
     out.actual.push_back(toolPose(experiment, Vec6::Map(row.truth.x), q));
-    out.on_base.push_back(toolPose(experiment, at->second, q));
+    out.on_base.push_back(toolPose(experiment, *x, q));
     out.at_rest.push_back(toolPose(experiment, start, q));
   });
   return out;

@@ -3,20 +3,19 @@
 
 #include <fmt/format.h>
 #include <zlib.h>
-#include <zstd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
 
 #include "ves/core/errors.hpp"
+#include "zstd.hpp"
 
 namespace ves {
 namespace {
 
 constexpr char kMagic[] = "\x89MCAP0\r\n";
 constexpr std::size_t kChunk = 1 << 20;  // [B] not compressed
-constexpr int kLevel = 3;                // [-] of zstd
 
 enum Opcode : std::uint8_t {
   kHeader = 1,
@@ -137,21 +136,16 @@ void McapWriter::write(std::uint16_t channel, std::int64_t time, const std::stri
 
 void McapWriter::endChunk() {
   if (chunk_.empty()) return;
-  std::string compressed(ZSTD_compressBound(chunk_.size()), '\0');
-  const std::size_t size =
-      ZSTD_compress(compressed.data(), compressed.size(), chunk_.data(), chunk_.size(), kLevel);
-  if (ZSTD_isError(size))
-    throw InputError(fmt::format("{}: zstd: {}", name_, ZSTD_getErrorName(size)));
-  compressed.resize(size);
-  Chunk chunk{chunk_start_, chunk_end_, at_, 0, 0, size, chunk_.size(), {}};
+  const std::string small = compressed(chunk_, name_);
+  Chunk chunk{chunk_start_, chunk_end_, at_, 0, 0, small.size(), chunk_.size(), {}};
   put(record(kChunkRecord, Fields()
                                .number(chunk_start_)
                                .number(chunk_end_)
                                .number(static_cast<std::uint64_t>(chunk_.size()))
                                .number(crc(chunk_))
                                .text("zstd")
-                               .number(static_cast<std::uint64_t>(size))
-                               .raw(compressed)));
+                               .number(static_cast<std::uint64_t>(small.size()))
+                               .raw(small)));
   chunk.length = at_ - chunk.offset;
   const std::uint64_t indexes = at_;
   for (const auto& [channel, entries] : chunk_index_) {

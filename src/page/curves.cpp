@@ -57,8 +57,7 @@ std::vector<float> Curves::of(const Row& row, const std::optional<Vec6>& base) c
   return out;
 }
 
-nlohmann::ordered_json recordedCurves(const Series& series,
-                                      const std::map<std::int64_t, Vec6>& base) {
+nlohmann::ordered_json recordedCurves(const Series& series, const BasePoses& base) {
   const Curves curves(series.experiment);
   std::vector<float> t;
   std::vector<std::vector<float>> rows;

@@ -451,15 +451,13 @@ nlohmann::ordered_json recording(const Series& series, double rate,
   const Scene scene(series.experiment);
   warnings.insert(warnings.end(), scene.warnings().begin(), scene.warnings().end());
   const std::optional<Emulation> emulated = emulation(series);
-  const auto base = emulated ? basePoses(series, emulated->base) : std::map<std::int64_t, Vec6>();
+  const BasePoses base = emulated ? basePoses(series, emulated->base) : BasePoses();
   std::vector<float> numbers;
   double next = -HUGE_VAL;
   for (const Row& row : series.rows) {
     if (row.t < next - 0.5e-9) continue;
     next = row.t + 1.0 / rate;
-    const auto at = base.find(row.state.header.sequence);
-    const std::vector<float> one =
-        scene.picture(row, at == base.end() ? std::nullopt : std::optional<Vec6>(at->second));
+    const std::vector<float> one = scene.picture(row, at(base, row.state));
     numbers.insert(numbers.end(), one.begin(), one.end());
   }
   Json out = {{"scene", scene.description()}, {"width", scene.width()}};

@@ -416,6 +416,23 @@ std::string csvField(const std::string& text) {
   return out + "\"";
 }
 
+std::vector<std::string> csvFields(const std::string& line) {
+  std::vector<std::string> out(1);
+  bool inside = false;
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    const char c = line[i];
+    if (inside && c == '"' && i + 1 < line.size() && line[i + 1] == '"')
+      out.back() += line[++i];
+    else if (c == '"')
+      inside = !inside;
+    else if (c == ',' && !inside)
+      out.emplace_back();
+    else
+      out.back() += c;
+  }
+  return out;
+}
+
 std::string csvHeader(const std::vector<Column>& columns) {
   std::string line;
   for (const Column& column : columns) line += (line.empty() ? "" : ",") + column.name;

@@ -68,21 +68,6 @@ constexpr const char* kNumbers[] = {"simulated_s",
 
 constexpr std::string_view kWords[] = {"ended", "first_cause"};  // columns of words
 
-/// The cells of a line of CSV.
-std::vector<std::string> cells(const std::string& line) {
-  std::vector<std::string> out(1);
-  bool inside = false;
-  for (const char c : line) {
-    if (c == '"')
-      inside = !inside;
-    else if (c == ',' && !inside)
-      out.emplace_back();
-    else
-      out.back() += c;
-  }
-  return out;
-}
-
 std::string headerOf(const SweepPlan& plan) {
   std::string line = "run";
   for (const std::string& key : plan.keys()) line += fmt::format(",{}", csvField(key));
@@ -115,6 +100,8 @@ std::string rowOf(const SweepPlan& plan, const Value& scenario, std::int64_t run
     for (const char* number : kNumbers)
       row += summary.contains(number) ? fmt::format(",{}", summary[number].get<double>()) : ",";
     return row;
+  } catch (const WouldStop& error) {
+    return row + ",refused," + csvField(error.what()) + "," + rest;
   } catch (const InputError& error) {
     return row + ",invalid," + csvField(error.what()) + "," + rest;
   }
@@ -122,14 +109,14 @@ std::string rowOf(const SweepPlan& plan, const Value& scenario, std::int64_t run
 
 /// Refuses a folder in which another sweep was begun; else leaves there what this one is.
 void requireSame(const SweepPlan& plan, const SweepOptions& options, bool simulates_subsets) {
-  std::vector<std::string> all = options.overrides;
-  for (const std::string& one : plan.overrides(0)) all.push_back(one);
+  Value first = loadDocument(options.scenario);
+  for (const std::string& one : options.overrides) applyOverride(first, one);
+  plan.put(plan.overrides(0), first);
   const std::string asked =
       options.figure ? fmt::format("towards {}\n", options.figure->question()) : std::string();
-  const std::string text =
-      plan.text() + (simulates_subsets ? asked : "") +
-      fmt::format("set {}\nconfiguration of run 0: {}\n", fmt::join(options.overrides, " "),
-                  loadExperiment(options.scenario, all).source.hash);
+  const std::string text = plan.text() + (simulates_subsets ? asked : "") +
+                           fmt::format("set {}\nscenario of run 0: {}\n",
+                                       fmt::join(options.overrides, " "), fingerprint(emit(first)));
   const fs::path file = options.file.string() + ".plan";
   if (std::ifstream in(file, std::ios::binary); in) {
     const std::string there((std::istreambuf_iterator<char>(in)), {});
@@ -151,7 +138,7 @@ std::map<std::int64_t, std::string> readRows(const fs::path& file, const std::st
   std::ifstream in(file, std::ios::binary);
   if (!in) return rows;
   const std::string text((std::istreambuf_iterator<char>(in)), {});
-  const std::size_t columns = cells(header).size();
+  const std::size_t columns = csvFields(header).size();
   std::size_t at = 0;
   for (int line = 1; at < text.size(); ++line) {
     const std::size_t end = text.find('\n', at);
@@ -167,7 +154,7 @@ std::map<std::int64_t, std::string> readRows(const fs::path& file, const std::st
     std::int64_t run = -1;
     const auto [stop, error] = std::from_chars(row.data(), row.data() + row.size(), run);
     const bool number = error == std::errc() && stop != row.data() + row.size() && *stop == ',';
-    if (!number || run < 0 || run >= runs || cells(row).size() != columns)
+    if (!number || run < 0 || run >= runs || csvFields(row).size() != columns)
       throw InputError(fmt::format("{}:{}: no row of this sweep of {} runs; --out another folder",
                                    file.string(), line, runs));
     rows[run] = row;
@@ -197,14 +184,14 @@ class FigureWatch {
 
   FigureWatch(const SweepOptions& options, const std::string& header)
       : figure_(options.figure), until_(options.until) {
-    if (figure_) figure_->find(cells(header));
+    if (figure_) figure_->find(csvFields(header));
   }
   /// Enough rows: from this run on none is needed.
   bool enough(const std::map<std::int64_t, std::string>& rows) {
     constexpr std::int64_t kLeast = 100;  // [-] values that an interval is told of
     if (!figure_ || enough_) return enough_;
     for (auto row = rows.find(next_); row != rows.end() && row->first == next_; ++row) {
-      figure_->add(cells(row->second));
+      figure_->add(csvFields(row->second));
       ++next_;
       if (!(until_ > 0.0) || next_ % kEach != 0) continue;
       const Figure::Estimate now = figure_->estimate();
@@ -292,7 +279,7 @@ void simulateSubsets(SubsetSimulation& subset, const Figure& figure, Runner& run
     for (std::int64_t run = batch.first; run < end; ++run) {
       const auto row = rows.find(run);
       if (row == rows.end()) return;
-      beyond.push_back(figure.beyond(cells(row->second)));
+      beyond.push_back(figure.beyond(csvFields(row->second)));
     }
     if (std::all_of(beyond.begin(), beyond.end(), [](double x) { return std::isnan(x); }) &&
         batch.first == 0)
@@ -311,7 +298,7 @@ void requireFigure(const SweepPlan& plan, const SweepOptions& options) {
   for (const std::string_view words : kWords)
     if (options.figure && options.figure->column() == words)
       throw InputError(fmt::format("--figure: '{}' has words, want a column of numbers", words));
-  if (auto figure = options.figure) figure->find(cells(headerOf(plan)));
+  if (auto figure = options.figure) figure->find(csvFields(headerOf(plan)));
   if (!plan.subset()) return;
   if (!options.figure || !options.figure->counts())
     throw InputError("--design subset: want --figure 'COLUMN>LIMIT', or <");
@@ -339,7 +326,7 @@ SweepResult sweep(SweepPlan& plan, const SweepOptions& options,
   Runner runner(plan, options, part, rows, shown, stop);
   if (subset) {
     Figure figure = *options.figure;
-    figure.find(cells(header));
+    figure.find(csvFields(header));
     simulateSubsets(*subset, figure, runner, rows);
   } else {
     std::vector<std::int64_t> missing;

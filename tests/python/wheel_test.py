@@ -25,6 +25,22 @@ print(numpy.__version__)
 """
 
 
+# What pandas reads is what CSV says.
+TABLES = """
+import pandas, sys
+for name in sys.argv[1:]:
+    table = pandas.read_parquet(name + ".parquet")
+    text = pandas.read_csv(name + ".csv", keep_default_na=False, dtype=str)
+    assert list(table.columns) == list(text.columns) and len(table) == len(text) > 1, name
+    for column in table.columns:
+        for there, said in zip(table[column], text[column]):
+            if table[column].dtype == float and said not in ("", "nan"):
+                assert there == float(said), (name, column, there, said)
+            else:
+                assert there == said or pandas.isna(there) and said in ("", "nan"), (name, column, there, said)
+"""
+
+
 def run(*command, cwd):
     bare = {"PATH": "/usr/bin:/bin", "HOME": str(cwd), "LANG": "C.UTF-8"}
     done = subprocess.run([str(word) for word in command], cwd=cwd, env=bare, text=True, capture_output=True)
@@ -52,8 +68,16 @@ def main():
         run(ves, "demo", "--lockstep", "--out", "demo", cwd=folder)
         run(ves, "view", "demo", "--html", "demo.html", cwd=folder)
         assert (folder / "demo.html").stat().st_size > 500_000
-        run(ves, "sweep", "z_sine", "--vary", "legs.tau_s=0.005,0.01", "--out", "table.csv", cwd=folder)
+        run(ves, "sweep", "z_sine", "--vary", "safety.translation_m=0.1,0.3", "--parquet", "--out", "swept",
+            cwd=folder)
+        # more rows than are written at a time
+        run(ves, "run", "z_sine", "--lockstep", "--no-plots", "--set", "program=[{monitor: {duration_s: 700}}]",
+            "--out", "long", cwd=folder)
+        for to in ("--out", "long.csv"), ("--parquet", "long.parquet"):
+            run(ves, "collect", "long", "--select", "z_", "phase", "kind", *to, cwd=folder)
         assert run(python, "-c", PROGRAM, cwd=folder).startswith("2.")
+        run(pip, "install", "--quiet", "pandas", "pyarrow", cwd=folder)
+        run(python, "-c", TABLES, "swept/sweep", "long", cwd=folder)
         run(pip, "install", "--quiet", "numpy<2", cwd=folder)
         assert run(python, "-c", PROGRAM, cwd=folder).startswith("1.")
         names = os.listdir(next(folder.glob("env/lib/python*/site-packages/ves.libs")))

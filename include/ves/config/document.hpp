@@ -114,6 +114,8 @@ class Section {
   void finish() const;
 
   [[noreturn]] void fail(std::string_view key, const std::string& what) const;
+  /// The same, of a motion that a check would stop. Throws WouldStop.
+  [[noreturn]] void failOfMotion(std::string_view key, const std::string& what) const;
   const std::string& path() const { return path_; }
 
  private:

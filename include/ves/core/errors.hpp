@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// The one exception of this project.
+// The exceptions of this project.
 #pragma once
 
 #include <stdexcept>
@@ -13,6 +13,12 @@ namespace ves {
 class InputError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
+};
+
+/// A motion that a check would stop, refused before it is run: nothing else is wrong with the input.
+class WouldStop : public InputError {
+ public:
+  using InputError::InputError;
 };
 
 }  // namespace ves

@@ -67,7 +67,10 @@ Amplitude amplitude(const Experiment& experiment, const Motion& base);
 std::vector<Column> columnsOf(const Series& series, const Emulation& emulation);
 
 /// Where the base would be, from home [m, rad], by the tick that it is for.
-std::map<std::int64_t, Vec6> basePoses(const Series& series, const Motion& base);
+using BasePoses = std::map<std::int64_t, Vec6>;
+BasePoses basePoses(const Series& series, const Motion& base);
+/// In the tick of a state.
+std::optional<Vec6> at(const BasePoses& poses, const state_t& state);
 
 /// A mode of base and robot together, the robot's joints locked.
 struct CoupledMode {

@@ -35,7 +35,6 @@ class Curves {
 /// and "value" where it never changes, else "least", "step" and "counts", base64 of 16 bits each:
 /// value = least + step count, 65535 for NaN. That is 1/65534 of its range, and no tick is left
 /// out.
-nlohmann::ordered_json recordedCurves(const Series& series,
-                                      const std::map<std::int64_t, Vec6>& base);
+nlohmann::ordered_json recordedCurves(const Series& series, const BasePoses& base);
 
 }  // namespace ves

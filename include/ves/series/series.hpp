@@ -105,6 +105,9 @@ bool selected(const std::string& name, const std::vector<std::string>& select,
 /// As a field of a table (RFC 4180); a new line becomes a space.
 std::string csvField(const std::string& text);
 
+/// The fields of a line of a table.
+std::vector<std::string> csvFields(const std::string& line);
+
 /// Lines of a table, without their end.
 std::string csvHeader(const std::vector<Column>& columns);
 std::string csvRow(const std::vector<Column>& columns, const Row& row);
