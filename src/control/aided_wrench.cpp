@@ -86,6 +86,7 @@ AidedWrench::AidedWrench(const ControllerConfig& config)
       joint_speed_(JointParabola(config).speed * config.joints.deviation),
       X_SP_(inverse(config.sensor.X_PS)),
       S_proc_(inverse(config.sensor.C_proc)),
+      C_proc_(config.sensor.C_proc),
       X_PL0_(config.payload.X_PL0()),
       regressor_(config.compensation.learns_masses
                      ? MassRegressor(config.payload.robot, config.hand)
@@ -140,12 +141,20 @@ Wrench AidedWrench::update(const Input& in, bool engaged) noexcept {
     take(in, countsPerWrench(in.X_IP.R), residual);
   }
   const Wrench beyond = Wrench::from(in.share * (in.measured - reaction_).stacked());
-  closed_ = withholds_ ? closed_ + 1 : 0;
+  Wrench passed = beyond;
+  if (withholds_)
+    passed =
+        lasting_.samples > 0 ? Wrench::from(in.share * lasting(in.X_IP.R).stacked()) : Wrench();
+  closed_ = withholds_ && lasting_.samples == 0 ? closed_ + 1 : 0;
   passing_ = closed_ <= hold_ ? passing_ + 1 : 0;
   lesson_.passing = passing_ > 0;
-  (withholds_ ? lesson_.withheld : lesson_.passed) =
-      in.emulated.apart ? rotate(in.emulated.R_EI, beyond) : beyond;
-  return withholds_ ? in.measured - beyond : in.measured;
+  const auto emulated = [&](const Wrench& F_Po_I) {
+    return in.emulated.apart ? rotate(in.emulated.R_EI, F_Po_I) : F_Po_I;
+  };
+  lesson_.passed = emulated(passed);
+  if (!withholds_) return in.measured;
+  lesson_.withheld = emulated(beyond - passed);
+  return in.measured - (beyond - passed);
 }
 
 /// A calibration measures bias and weight together: what it read beyond the weight then believed
@@ -172,6 +181,7 @@ void AidedWrench::calibrate(const Input& in) noexcept {
 }
 
 void AidedWrench::restart() noexcept {
+  lasting_ = {};
   in_group_ = -1;
   groups_ = 0;
   sums_[0].columns.setZero(6, prior_.size());
@@ -207,7 +217,7 @@ void AidedWrench::take(const Input& in, const Mat6& counts_per_wrench,
   if (!withholds_) return;
   const Vec6 y = counts_per_wrench * residual.stacked() + in.bias.learnt(),
              beyond = weight_ * (belief_.parameters() - used_),
-             left = y - belief_.bias() - counts_per_wrench * beyond;
+             left = y - belief_.bias() - counts_per_wrench * beyond - lasting_.mean;
   if (gate_.exceeds(0, left, noise_, unknown_)) {
     open(belief_, std::max(0, in_group_) + 1);
     return;
@@ -258,6 +268,10 @@ void AidedWrench::endGroup(const Mat6& counts_per_wrench) noexcept {
         static_cast<std::size_t>(ResidualGate::kMeans[i]) / (kGroupsOfBlock * Lesson::kGroup);
     if (block + 1 >= blocks && isForce(i, beliefs_[(block + 1 - blocks) % kBlocks])) return;
   }
+  if (lasting_.samples > 0) {
+    beliefs_[(block + 1) % kBlocks] = belief_;
+    return refineLasting();
+  }
   const Sum& before = sums_[(groups_ - kGroupsOfBlock) % sums_.size()];
   const double block_time = sum.time - before.time;
   constexpr double kShare = 1.0 / static_cast<double>(kGroupsOfBlock);
@@ -267,6 +281,23 @@ void AidedWrench::endGroup(const Mat6& counts_per_wrench) noexcept {
   if (doubts_ > 0) belief_.doubt(regressor_.hand(), hand_);
   beliefs_[(block + 1) % kBlocks] = belief_;
   use();
+}
+
+/// With what came since it was found, until that is as much as is kept. Where later on the last of
+/// it shows less than half of what would be found, there is none any more.
+void AidedWrench::refineLasting() noexcept {
+  const std::size_t n = std::min(groups_, Lesson::kGroups);
+  const Sum &now = sums_[groups_ % sums_.size()], &then = sums_[(groups_ - n) % sums_.size()];
+  const auto groups = static_cast<double>(n);
+  const MassColumns columns = (now.columns - then.columns) / groups;
+  const Vec6 mean = belief_.unexplained(columns, (now.y - then.y) / groups);
+  if (groups_ <= Lesson::kGroups) {
+    const double found = lasting_.samples, since = groups * Lesson::kGroup;
+    lasting_.mean = (found * lasting_.found + since * mean) / (found + since);
+  }
+  if (n == Lesson::kGroups && !gate_.exceeds(ResidualGate::kMeans.size() - 1, 2.0 * mean, noise_,
+                                             belief_.variance(columns)))
+    restart();
 }
 
 /// What passed of late was the weight in the hand, and what comes may be.
@@ -289,9 +320,14 @@ bool AidedWrench::isForce(std::size_t mean, const MassBelief& before) noexcept {
   const auto n = static_cast<std::size_t>(samples / Lesson::kGroup);
   const Sum &now = sums_[groups_ % sums_.size()], &then = sums_[(groups_ - n) % sums_.size()];
   const MassColumns columns = (now.columns - then.columns) / static_cast<double>(n);
-  const Vec6 left = before.unexplained(columns, (now.y - then.y) / static_cast<double>(n));
-  if (!gate_.exceeds(mean, left, noise_, before.variance(columns))) return false;
+  const Vec6 all = before.unexplained(columns, (now.y - then.y) / static_cast<double>(n)),
+             unknown = before.variance(columns);
+  if (!gate_.exceeds(mean, all - lasting_.mean, noise_, unknown)) return false;
   open(before, samples);
+  if (mean < ResidualGate::kLasting) return true;
+  open_ = 0;
+  withholds_ = true;
+  if (gate_.exceeds(mean, all, noise_, unknown)) lasting_ = {all, all, samples};
   return true;
 }
 
@@ -324,6 +360,10 @@ void AidedWrench::use() noexcept {
 Vec6 AidedWrench::momentumNoise() const noexcept {
   constexpr double kShare = 0.05;  // [-] rms, of a leg that is off by K count for good: measured
   return (kShare * noise_.legs).cwiseAbs2() + (M_SQRT1_2 * period_ * noise_.joints).cwiseAbs2();
+}
+
+Wrench AidedWrench::lasting(const Mat3& R_IP) const noexcept {
+  return rotate(R_IP, transfer(inverse(X_SP_), Wrench::from(C_proc_ * lasting_.mean)));
 }
 
 /// What the sensor reads of a wrench.

@@ -274,6 +274,10 @@ void PlantPeriodHydraulic(benchmark::State& state) { plantPeriod(state, "hydraul
 BENCHMARK(PlantPeriod);
 BENCHMARK(PlantPeriodHydraulic);
 
+/// One on every core at once: of each, as a rollout has them.
+void PlantPeriodsOnAllCores(benchmark::State& state) { plantPeriod(state, "hydraulic"); }
+BENCHMARK(PlantPeriodsOnAllCores)->ThreadPerCpu()->UseRealTime();
+
 void rates(benchmark::State& state, double simulated, std::int64_t ticks) {
   state.counters["x_real_time"] = benchmark::Counter(simulated, benchmark::Counter::kIsRate);
   state.counters["ticks_per_s"] =

@@ -28,6 +28,8 @@ WORK = [
     (STEWART + ", with cylinders", "PlantPeriodHydraulic", {"MujocoPlantPeriod": "MuJoCo"},
      "Ours: valves, oil, friction and the platform on six forces, its transducers and force sensor. MuJoCo: legs of two hinges "
      "and a slide with stiff servos, tied to the platform, steps of 1 ms."),
+    (STEWART + ", with cylinders, one on every core at once: time for each", "PlantPeriodsOnAllCores",
+     {"MujocoPlantPeriodsOnAllCores": "MuJoCo"}, "As a rollout has them: a thread a core, one model, data of its own each."),
     (STEWART + ", ideal legs", "PlantPeriod", {"MujocoPlantPeriod": "MuJoCo"},
      "Ours: legs that follow as velocity servos, transducers and force sensor; the platform does not push back."),
 ]

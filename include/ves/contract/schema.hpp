@@ -232,7 +232,9 @@ constexpr void fields(S& s, auto&& f) {
           "minus the rate of the joints' modelled momentum; 0 unless the wrench is aided", kWrench,
           "reaction"},
     Field{"withholds", "-", s.withholds,
-          "1: what differs from that is withheld as noise, dynamic is reaction"},
+          "1: what differs from that is withheld as noise; dynamic is reaction and, where a small "
+          "force "
+          "lasts, its mean"},
     Field{"learnt_mass", "kg", s.learnt.mass,
           "of the heaviest bodies and of what is in hand, in use; 0 unless masses are learnt",
           kBodies, "learnt_mass"},

@@ -33,6 +33,8 @@ class ResidualGate {
  public:
   /// [-] samples: one, and groups of Lesson::kGroup.
   static constexpr std::array<int, 5> kMeans = {1, 5, 20, 60, 200};
+  static constexpr std::size_t kLasting = 3;  // what only means from here on show is a force that
+                                              // lasts
 
   explicit ResidualGate(const ControllerConfig& config);
 
@@ -52,8 +54,9 @@ class ResidualGate {
 /// Masses and bias are learnt from the means of what is left (MassBelief), from the calibration on:
 /// that is one measurement of bias and weight together. What means of 1 to 200 samples show beyond
 /// it is a force: it passes, the base is given what was withheld of it, and what was learnt from it
-/// is forgotten. The sensor's noise is what its last calibration found; without one everything
-/// passes.
+/// is forgotten. One that only long means show is small and lasts: its mean since it was found
+/// passes, without the noise, until another mean shows that it has changed. The sensor's noise is
+/// what its last calibration found; without one everything passes.
 ///
 /// Where the gripper has closed or opened, for half a second what a body in the hand may explain is
 /// taken for its weight, also what passed in the half second before.
@@ -79,7 +82,7 @@ class AidedWrench {
 
   /// Of the newest sample; zero unless the wrench is aided.
   const Wrench& reaction() const noexcept { return reaction_; }  // F_Po_I, modelled
-  bool withholds() const noexcept { return withholds_; }         // the residual
+  bool withholds() const noexcept { return withholds_; }         // the residual, or its noise
   const ResidualNoise& noise() const noexcept { return noise_; }
   const MassBelief& belief() const noexcept { return belief_; }
   /// What the model has, and how well it is known.
@@ -92,6 +95,12 @@ class AidedWrench {
   RobotModel robot() const noexcept { return regressor_.changed(used_); }
 
  private:
+  /// A force that lasts, as far as it is known by now.
+  struct Lasting {
+    Vec6 mean = Vec6::Zero();   // [count] that passes
+    Vec6 found = Vec6::Zero();  // [count] the mean that showed it,
+    int samples = 0;            // [-] of so many; 0: there is none
+  };
   /// Sums of means over groups of samples: residuals [count], beyond the first belief, and what
   /// each parameter adds to them.
   struct Sum {
@@ -107,6 +116,8 @@ class AidedWrench {
   void endGroup(const Mat6& counts_per_wrench) noexcept;
   bool isForce(std::size_t mean, const MassBelief& before) noexcept;
   void open(const MassBelief& before, int samples) noexcept;
+  void refineLasting() noexcept;
+  Wrench lasting(const Mat3& R_IP) const noexcept;  // F_Po_I
   void restart() noexcept;
   void doubtHand(const Mat6& counts_per_wrench) noexcept;
   void use() noexcept;
@@ -128,7 +139,8 @@ class AidedWrench {
   Vec6 leg_speed_ = Vec6::Zero();       // [m/s] of late
   JointVector joint_speed_;             // [rad/s | m/s] rms, by readings of joints
   Transform X_SP_;
-  Mat6 S_proc_;  // [count per N | N m]
+  Mat6 S_proc_;  // [count per N | N m], and
+  Mat6 C_proc_;  // its inverse
   Transform X_PL0_;
   MassRegressor regressor_;
   double common_;          // [-] deviation of all bodies' density,
@@ -162,9 +174,10 @@ class AidedWrench {
   std::size_t groups_ = 0;
   std::array<MassBelief, kBlocks> beliefs_{};  // before each block, a ring
   int open_ = 0;                               // [-] samples to come
-  int doubts_ = 0;                             // [-] samples in which the hand's load may change
-  int passing_ = 0, closed_ = 0;               // [-] ticks since residuals passed first of late,
-                                               // and since they passed last
+  Lasting lasting_;
+  int doubts_ = 0;                // [-] samples in which the hand's load may change
+  int passing_ = 0, closed_ = 0;  // [-] ticks since residuals passed first of late,
+                                  // and since they passed last
 
   Lesson lesson_;
   Wrench reaction_;
