@@ -666,6 +666,57 @@ TEST_F(Emulation, AnAidedWrenchFindsASmallForceThatLasts) {
   }
 }
 
+// The sensor's zero has moved between two calibrations: that is no force, and no mass.
+TEST_F(Emulation, ASecondCalibrationMovesTheBiasAlone) {
+  for (const std::vector<std::string>& learns :
+       {std::vector<std::string>{}, {"controller.compensation.learns_masses=true"}}) {
+    const Series series = run(experiment(
+        "srms_low_hover_puma", with(kCompensated, with(kAidedWrench, learns)),
+        with({"base.keep_modes=6",
+              "program=[{move: {}}, {calibration: {}}, {move: {duration_s: 2}, faults: [{at_s: 1, "
+              "duration_s: 60, fault: wrench_step, which: 3, counts: 40}]}, {calibration: {}}, "
+              "{admittance: {duration_s: 8}}]"},
+             kMean)));
+    EXPECT_TRUE(result_.good());
+    int withheld = 0, all = 0;
+    double most = 0.0;
+    for (const Row& row : series.rows)
+      if (inAdmittance(row.state)) {
+        ++all;
+        withheld += row.state.withholds;
+        most = std::max(most, Vec3::Map(row.state.x_desired).norm());
+      }
+    EXPECT_EQ(withheld, all);
+    EXPECT_GT(all, 700);
+    EXPECT_LT(most, 1e-6);
+  }
+}
+
+// And one that is tared while things run.
+TEST_F(Emulation, ATareTakesADriftFromAnAidedWrenchToo) {
+  Rig rig(experiment(
+      "srms_low_hover_puma", with(kCompensated, kAidedWrench),
+      with({"base.keep_modes=6",
+            "program=[{move: {}}, {calibration: {}}, {admittance: {duration_s: 30}, faults: "
+            "[{at_s: 1, duration_s: 60, fault: wrench_step, which: 3, counts: 40}]}]"},
+           kMean)));
+  rig.tick(Request::kStart);
+  int admitted = 0, withheld = 0, of = 0, passed = 0;
+  while (!test::done(rig.state())) {
+    const TickState& s = rig.tick(admitted == 300 ? Request::kTare : Request::kNone);
+    if (s.kind != SegmentKind::kAdmittance) continue;
+    ++admitted;
+    passed += admitted < 300 && !s.withholds;
+    if (admitted < 1500) continue;
+    ++of;
+    withheld += s.withholds && (s.dynamic.stacked() - s.reaction.stacked()).norm() < 1e-9;
+  }
+  EXPECT_EQ(rig.state().phase, Phase::kParked);
+  EXPECT_GT(passed, 100);  // until it is tared it is a force
+  EXPECT_GT(of, 1000);
+  EXPECT_EQ(withheld, of);
+}
+
 // One that has all but gone is none: what it was does not push on.
 TEST_F(Emulation, AForceThatLastedDoesNotPushOn) {
   const double newton = 0.66719e-6 * 10.0 * 1000.0 * 32768.0 / 10.0;  // [count], ves.yaml

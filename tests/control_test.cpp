@@ -95,6 +95,18 @@ TEST(ChannelStatistics, GivesMeanAndStandardDeviation) {
   EXPECT_NEAR(calibration.deviation()(0), 0.0, 1e-12);
 }
 
+// Two batches of ten that differ by 2 d: their mean is known to d.
+TEST(ChannelStatistics, KnowsTheMeanAsWellAsItsBatchesAgree) {
+  ChannelStatistics calibration;
+  for (int n = 0; n < 20; ++n) {
+    AdcCounts adc{};
+    adc[2] = n < 10 ? 100 : 140;
+    calibration.add(adc, Vec6::Zero());
+    if (n == 18) EXPECT_EQ(calibration.standardError(), Vec6(Vec6::Zero()));
+  }
+  EXPECT_NEAR(calibration.standardError()(2), 20.0, 1e-12);
+}
+
 TEST(GravityCompensation, IsTheSumOfWeightsAtKdlsPositions) {
   for (const auto& [scenario, urdf] :
        {std::pair{"puma_tilt", "puma560"}, {"doss_on_table_4_1", "doss"}}) {

@@ -197,6 +197,44 @@ TEST(FreeBody, IsItsModesForSmallMotions) {
   EXPECT_NEAR(whole / tenth, 10.0, 1.0);
 }
 
+// The speed stays when the mass changes: what that costs is what the motion holds more.
+TEST(FreeBody, AnotherMassCostsWhatItsMotionHoldsMore) {
+  FreeBodyModel model = asymmetric({0.1, 0.2, -0.5});
+  model.w_IP_I = {0.2, -0.1, 0.3};
+  FreeBody body(model, kTick);
+  body.reset(Vec6::Zero());
+  for (int n = 0; n < 50; ++n) body.step({{8.0, -5.0, 3.0}, {1.0, 2.0, -4.0}});
+  double before = body.kineticEnergy();
+  EXPECT_GT(before, 1.0);
+  for (const double mass : {1.5, 0.4, 3.0}) {
+    const double cost = body.costOf({mass, 1.0, 1.0});
+    body.become({mass, 1.0, 1.0});
+    EXPECT_NEAR(body.kineticEnergy() - before, cost, 1e-12);
+    before = body.kineticEnergy();
+  }
+}
+
+// A force that was withheld moves what runs beside the vehicle as it would have moved the vehicle,
+// turned as it is and with the robot on it.
+TEST(FreeBody, WhatRunsBesideItHasTheMassOfAll) {
+  const FreeBodyModel model = asymmetric({0.1, 0.2, -0.5});
+  const Mat6 M_1 = spatialMass({50.0, {0.1, 0.0, 0.6}, Vec3(8.0, 8.0, 2.0).asDiagonal()});
+  FreeBody body(model, kTick);
+  Vec6 x;
+  x << 0.1, -0.2, 0.05, 0.2, -0.3, 0.4;
+  body.reset(x);
+  const ModalDynamics& beside = body.dynamics();
+  const Vec6 F = (Vec6() << 8.0, -5.0, 3.0, 1.0, 2.0, -4.0).finished();
+  for (const double mass : {1.0, 2.0}) {
+    body.become({mass, 1.0, 1.0});
+    const ModalDynamics::Modes moved =
+        beside.advance(body.body(M_1), kTick, beside.atRest(), beside.Phi().transpose() * F / mass);
+    const Mat6 all = mass * spatialMass(rotated(body.state().R_IP, model.body_P)) + M_1;
+    const Vec6 velocity = beside.Phi() * moved.eta_dot;
+    EXPECT_LT((velocity - kTick * inverse(all) * F).norm(), 1e-12) << mass;
+  }
+}
+
 TEST(FreeBody, KeepsItsBooks) {
   // What the wrench gives, less what damping takes, is in the motion of both bodies.
   const FreeBodyModel model = asymmetric({0.1, 0.2, -0.5});

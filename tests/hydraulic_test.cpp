@@ -264,6 +264,7 @@ Swing swing(const Experiment& e, int mode) {
   const SymmetricEigen modes = symmetricEigen(half * K * half);
   out.due = std::sqrt(modes.values(mode));
   HydraulicPlatform platform(g, *e.plant.hydraulic, home, load);
+  EXPECT_EQ(platform.loadWork(), 0.0);  // what it begins with is no change of load
   const Vec6 shape = half * modes.vectors.col(mode), push = 0.5 * K * shape / shape.norm() * 1e-4;
   PlatformLoad pushed = load;
   pushed.F_Po_P = pushed.F_Po_P + Wrench::from(push);

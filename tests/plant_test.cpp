@@ -365,6 +365,14 @@ TEST(JointEncoders, RoundToCountsBehindTheirPlay) {
     EXPECT_NEAR(read(1), played, 1e-12) << q;
     EXPECT_EQ(read(2), q);
   }
+  EXPECT_TRUE(plant::JointEncoderModel().exact());
+  for (JointVector plant::JointEncoderModel::*const fault :
+       {&plant::JointEncoderModel::count, &plant::JointEncoderModel::play,
+        &plant::JointEncoderModel::noise}) {
+    model = {};
+    (model.*fault)(1) = 0.1;
+    EXPECT_FALSE(model.exact());
+  }
   model = {};
   model.noise(0) = 1e-3;
   plant::JointEncoders noisy(model, Noise(1), JointVector::Zero());

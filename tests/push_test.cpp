@@ -5,6 +5,7 @@
 
 #include "support/refusal.hpp"
 #include "support/rig.hpp"
+#include "ves/contract/plausible.hpp"
 #include "ves/evaluation/let_go.hpp"
 #include "ves/run/robot_orders.hpp"
 #include "ves/series/series.hpp"
@@ -201,6 +202,10 @@ TEST(Push, NothingRealIsPushed) {
   EXPECT_EQ(test::refusal([&] { refused.take(order, {}); }),
             "a push is for a machine that is all simulated; pieces of this one are real");
   EXPECT_TRUE(taken.take(order, {}));
+  PushOrder nowhere = order;
+  nowhere.on = static_cast<PushOrder::On>(3);
+  EXPECT_TRUE(plausible(order));
+  EXPECT_FALSE(plausible(nowhere));
   const Experiment none = calm("free_decay");
   RobotOrders nobody(none);
   EXPECT_TRUE(nobody.take(order, {}));

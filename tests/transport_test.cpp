@@ -339,6 +339,19 @@ TEST_F(PrivateBus, SamplesThatAreNotTakenAreCountedByTheirCause) {
   EXPECT_EQ(link.samplesRejected().old, 4);
 }
 
+TEST(Rejections, AreToldByTheirCauses) {
+  EXPECT_EQ(Rejections().text(), "");
+  Rejections of;
+  of.malformed = 1;
+  of.out_of_range = 2;
+  of.of_another = 3;
+  of.old = 4;
+  const std::string text = of.text();
+  for (const char* told : {"10 samples", "1 malformed", "2 with a value out of range",
+                           "3 of another", "4 of an earlier sequence"})
+    EXPECT_NE(text.find(told), std::string::npos) << text;
+}
+
 TEST_F(PrivateBus, WhoWaitsForNothingWaitsAsLongAsTold) {
   Bus bus(kDefaultUrl);
   bus.subscribe({channel::kTiming}, [](const std::string&, const void*, std::uint32_t) {});

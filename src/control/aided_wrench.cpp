@@ -158,8 +158,11 @@ Wrench AidedWrench::update(const Input& in, bool engaged) noexcept {
 }
 
 /// A calibration measures bias and weight together: what it read beyond the weight then believed
-/// counts as bias.
+/// counts as bias. So does a tare that came to its end; the bias may have drifted since the last.
 void AidedWrench::calibrate(const Input& in) noexcept {
+  const bool tared = taring_ && !in.bias.taring() && in.bias.found() != before_tare_;
+  if (!taring_ && in.bias.taring()) before_tare_ = in.bias.found();
+  taring_ = in.bias.taring();
   if (in.bias.found() != bias_) {
     if (begun_) belief_.moveBias(in.bias.found() - bias_);
     bias_ = in.bias.found();
@@ -168,9 +171,13 @@ void AidedWrench::calibrate(const Input& in) noexcept {
   const bool took = taking_;
   taking_ = in.bias.calibration().status() == CalibrationStatus::kTaking;
   const bool done = in.bias.calibration().status() == CalibrationStatus::kDone;
-  if (!(done && (took || !begun_))) return;
-  if (!begun_) belief_.begin(prior_, common_, bias_deviation_);
+  if (!(done && (took || !begun_)) && !(begun_ && tared)) return;
+  if (begun_)
+    belief_.doubtBias(bias_deviation_);
+  else
+    belief_.begin(prior_, common_, bias_deviation_);
   begun_ = true;
+  open_ = 0;
   MassColumns momentum, weight;
   regressor_.evaluate(X_PL0_, gravity_, {in.X_IP.R, {}, {}, in.joints.q(), {}}, momentum, weight);
   MassColumns columns;

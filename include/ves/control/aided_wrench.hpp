@@ -160,6 +160,8 @@ class AidedWrench {
   MassVector used_;                      // the parameters that the model has
   Vec6 bias_ = Vec6::Zero();             // [count] that belief_ counts its bias from
   bool begun_ = false, taking_ = false;  // a calibration
+  bool taring_ = false;
+  Vec6 before_tare_ = Vec6::Zero();  // [count]
   bool hand_moved_ = false;              // and that has not been looked at
   bool taught_ = false;
 

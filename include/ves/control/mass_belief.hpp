@@ -39,6 +39,10 @@ class MassBelief {
   void doubt(Eigen::Index first, const Eigen::Vector4d& deviations) noexcept {
     P_.diagonal().segment<4>(first) += deviations.cwiseAbs2();
   }
+  /// So may the bias of every channel. [count]
+  void doubtBias(double deviation) noexcept {
+    P_.diagonal().segment<6>(size()).array() += deviation * deviation;
+  }
   /// The bias that is taken out has changed by so much. [count]
   void moveBias(const Vec6& by) noexcept { x_.segment<6>(size()) -= by; }
 
