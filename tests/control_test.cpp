@@ -102,7 +102,9 @@ TEST(ChannelStatistics, KnowsTheMeanAsWellAsItsBatchesAgree) {
     AdcCounts adc{};
     adc[2] = n < 10 ? 100 : 140;
     calibration.add(adc, Vec6::Zero());
-    if (n == 18) EXPECT_EQ(calibration.standardError(), Vec6(Vec6::Zero()));
+    if (n == 18) {
+      EXPECT_EQ(calibration.standardError(), Vec6(Vec6::Zero()));
+    }
   }
   EXPECT_NEAR(calibration.standardError()(2), 20.0, 1e-12);
 }
