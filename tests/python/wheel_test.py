@@ -71,7 +71,7 @@ def main():
         run(ves, "sweep", "z_sine", "--vary", "safety.translation_m=0.1,0.3", "--parquet", "--out", "swept",
             cwd=folder)
         # more rows than are written at a time
-        run(ves, "run", "z_sine", "--lockstep", "--no-plots", "--set", "program=[{monitor: {duration_s: 700}}]",
+        run(ves, "run", "z_sine", "--lockstep", "--no-plots", "--set", "program=[{move: {duration_s: 700}}]",
             "--out", "long", cwd=folder)
         for to in ("--out", "long.csv"), ("--parquet", "long.parquet"):
             run(ves, "collect", "long", "--select", "z_", "phase", "kind", *to, cwd=folder)
