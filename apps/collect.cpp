@@ -109,6 +109,8 @@ int collectCommand(int argc, char** argv) {
   return run(cli, argc, argv, [&] {
     if (follow == !log.empty() || (follow && mcap.empty()))
       throw InputError("want a log, or --follow with --mcap FILE");
+    if ((list || !out.empty()) + !parquet.empty() + !mcap.empty() > 1)
+      throw InputError("want one of --out or --list, --parquet and --mcap");
     if (!mcap.empty()) requireReplaceable("--mcap", mcap, "\x89MCAP");
     joinIfNamed(join);
     if (follow) return followIntoMcap(url, mcap);
@@ -127,7 +129,6 @@ int collectCommand(int argc, char** argv) {
       throw InputError(fmt::format("--from {}: the log ends at {} s", from, series.rows.back().t));
 
     if (!parquet.empty()) {
-      if (list || !out.empty()) throw InputError("--parquet: want no --out and no --list with it");
       requireReplaceable("--parquet", parquet, "PAR1");
       ParquetWriter table = tableOf(series, chosen, parquet);
       eachRow(series, from, duration, rate, [&](const Row& row) { addRow(chosen, row, table); });

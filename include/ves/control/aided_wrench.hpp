@@ -33,8 +33,8 @@ class ResidualGate {
  public:
   /// [-] samples: one, and groups of Lesson::kGroup.
   static constexpr std::array<int, 5> kMeans = {1, 5, 20, 60, 200};
-  static constexpr std::size_t kLasting = 3;  // what only means from here on show is a force that
-                                              // lasts
+  /// What only means from this one on show is a force that lasts.
+  static constexpr std::size_t kLasting = 3;
 
   explicit ResidualGate(const ControllerConfig& config);
 
@@ -160,8 +160,8 @@ class AidedWrench {
   MassVector used_;                      // the parameters that the model has
   Vec6 bias_ = Vec6::Zero();             // [count] that belief_ counts its bias from
   bool begun_ = false, taking_ = false;  // a calibration
-  bool taring_ = false;
-  Vec6 before_tare_ = Vec6::Zero();  // [count]
+  bool taring_ = false;                  // and where that begins:
+  Vec6 before_tare_ = Vec6::Zero();      // [count] what was found before
   bool hand_moved_ = false;              // and that has not been looked at
   bool taught_ = false;
 
