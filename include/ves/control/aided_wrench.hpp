@@ -160,8 +160,8 @@ class AidedWrench {
   MassVector used_;                      // the parameters that the model has
   Vec6 bias_ = Vec6::Zero();             // [count] that belief_ counts its bias from
   bool begun_ = false, taking_ = false;  // a calibration
-  bool taring_ = false;                  // and where that begins:
-  Vec6 before_tare_ = Vec6::Zero();      // [count] what was found before
+  bool taring_ = false;                  // a tare is under way
+  Vec6 before_tare_ = Vec6::Zero();      // [count] the bias as it began
   bool hand_moved_ = false;              // and that has not been looked at
   bool taught_ = false;
 
