@@ -213,6 +213,11 @@ int acceptCommand(int argc, char** argv) {
     wanted.tests.sines = asked("sines");
     wanted.tests.passes = asked("passes");
     wanted.tests.steps = asked("steps");
+    if (!wanted.tests.sines)
+      refuse(cli, {"--frequencies", "--amplitudes"}, "without sines among --tests");
+    if (!wanted.tests.passes) refuse(cli, {"--slow"}, "without passes among --tests");
+    if (!wanted.tests.steps) refuse(cli, {"--step"}, "without steps among --tests");
+    options.requireUsed(cli);
     return accept(options, wanted);
   });
 }

@@ -5,6 +5,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <unistd.h>
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -58,6 +59,25 @@ inline CLI::Validator aboveZero() {
                                      : fmt::format("'{}', want a number above 0", text);
           },
           "above 0"};
+}
+
+/// A file that is written is called what it is.
+inline CLI::Validator endsWith(std::vector<std::string> endings) {
+  return {[endings](std::string& file) {
+            const std::string ending = std::filesystem::path(file).extension().string();
+            const bool is = std::find(endings.begin(), endings.end(), ending) != endings.end();
+            return is ? std::string()
+                      : fmt::format("'{}', want a name that ends in {}", file,
+                                    fmt::join(endings, ", "));
+          },
+          ""};
+}
+
+/// What would be dropped in silence is refused: none of these options may be given `where`.
+inline void refuse(const CLI::App& cli, std::initializer_list<const char*> options,
+                   const std::string& where) {
+  for (const char* option : options)
+    if (cli.count(option) > 0) throw InputError(fmt::format("{}: means nothing {}", option, where));
 }
 
 inline int allCores() {
@@ -294,6 +314,16 @@ inline std::string optionMeant(const CLI::App& cli, const std::string& said) {
   return meant.empty() ? "" : fmt::format(", did you mean {}?", meant);
 }
 
+/// An option whose text is empty, as of a shell's variable that is not set; or no name.
+inline std::string emptyOption(const CLI::App& cli) {
+  for (const CLI::App* one = &cli; one;
+       one = one->get_subcommands().empty() ? nullptr : one->get_subcommands().front())
+    for (const CLI::Option* option : one->get_options())
+      for (const std::string& text : option->results())
+        if (text.empty()) return option->get_name();
+  return "";
+}
+
 /// The names of its subcommands.
 inline std::string partsOf(const CLI::App& cli) {
   std::string out;
@@ -326,6 +356,8 @@ inline int run(CLI::App& cli, int argc, char** argv, const std::function<int()>&
     return kBadInput;
   }
   try {
+    if (const std::string option = emptyOption(cli); !option.empty())
+      throw InputError(option + ": is empty");
     const int status = body();
     std::cout.flush();
     if (std::fflush(stdout) != 0 || std::ferror(stdout) || !std::cout)

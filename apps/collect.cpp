@@ -100,8 +100,10 @@ int collectCommand(int argc, char** argv) {
   cli.add_option("--from", from, "[s] since the first tick")->check(inRange(0.0, 1e9));
   cli.add_option("--duration", duration, "[s]; to the end by default")->check(inRange(0.0, 1e9));
   cli.add_option("--out", out, "file; standard output by default");
-  cli.add_option("--parquet", parquet, "the same table as a Parquet file, for pandas and others");
-  cli.add_option("--mcap", mcap, "everything into this MCAP file for Foxglove, PlotJuggler, Rerun");
+  cli.add_option("--parquet", parquet, "the same table as a Parquet file, for pandas and others")
+      ->check(endsWith({".parquet"}));
+  cli.add_option("--mcap", mcap, "everything into this MCAP file for Foxglove, PlotJuggler, Rerun")
+      ->check(endsWith({".mcap"}));
   cli.add_flag("--follow", follow, "the run on the bus instead of a log, with --mcap");
   addScenarioOfLog(cli, scenario);
   addUrl(cli, url, "LCM bus, with --follow");
@@ -111,6 +113,14 @@ int collectCommand(int argc, char** argv) {
       throw InputError("want a log, or --follow with --mcap FILE");
     if ((list || !out.empty()) + !parquet.empty() + !mcap.empty() > 1)
       throw InputError("want one of --out or --list, --parquet and --mcap");
+    if (!mcap.empty())
+      refuse(cli, {"--select", "--rate", "--from", "--duration"},
+             "beside --mcap, which has everything");
+    if (list) refuse(cli, {"--rate", "--from", "--duration"}, "beside --list");
+    if (follow)
+      refuse(cli, {"--scenario"}, "beside --follow");
+    else
+      refuse(cli, {"--url", "--join"}, "without --follow");
     if (!mcap.empty()) requireReplaceable("--mcap", mcap, "\x89MCAP");
     joinIfNamed(join);
     if (follow) return followIntoMcap(url, mcap);

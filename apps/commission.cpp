@@ -102,6 +102,7 @@ int commissionCommand(int argc, char** argv) {
       ->check(inRange(0.1, 1000.0))
       ->capture_default_str();
   return run(cli, argc, argv, [&] {
+    options.requireUsed(cli);
     wanted.accuracy = accuracy / 100.0;
     return commission(options, wanted);
   });

@@ -102,7 +102,8 @@ int compareCommand(int argc, char** argv) {
   std::vector<std::string> given;
   std::string html, scenario;
   cli.add_option("run", given, "folders of runs, or logs")->required()->expected(2, kMostRuns);
-  cli.add_option("--html", html, "a page with the tables and overlaid curves");
+  cli.add_option("--html", html, "a page with the tables and overlaid curves")
+      ->check(endsWith({".html"}));
   addScenarioOfLog(cli, scenario);
   return run(cli, argc, argv, [&] {
     if (!html.empty()) requireReplaceable("--html", html, "<!DOCTYPE");

@@ -142,10 +142,14 @@ int conformCommand(int argc, char** argv) {
       ->capture_default_str();
   cli.add_flag("--move", moves, "move the platform, when all else is well");
   return run(cli, argc, argv, [&] {
+    for (const std::string& one : options.overrides)
+      if (one.starts_with("program="))
+        throw InputError("--set program: means nothing here, the motion is this command's own");
     options.overrides.push_back(
         "program=[{move: {}}, {move: {to: {x_m: 0.01, y_m: -0.008, z_m: 0.02, alpha_deg: 2, "
         "beta_deg: -1.5, gamma_deg: 1}, duration_s: 2}}, {move: {}}]");
     const Experiment experiment = options.load();
+    if (options.verbose) printWarnings(experiment, true);
     options.enterBus();
     catchSignals();
     fmt::print(stderr, "listening on {} for {:g} s\n", options.process.url, seconds);

@@ -21,6 +21,7 @@ int serve(ControllerOptions& options) {
   options.enterBus();
   catchSignals();
   Experiment experiment = options.load();
+  if (options.verbose) printWarnings(experiment, true);
   if (options.process.start) {
     warnOfInstability(experiment);
   } else {
@@ -94,7 +95,8 @@ int controllerCommand(int argc, char** argv) {
       ->allow_extra_args(false);
   cli.add_flag("--plant", options.plant, "start a plant too");
   cli.add_flag("--start", options.process.start, "run the scenario's program at once; no menu");
-  cli.add_flag("--no-menu", options.no_menu, "wait for orders from the bus");
+  cli.add_flag("--no-menu", options.no_menu, "wait for orders from the bus")
+      ->excludes(cli.get_option("--start"));
   cli.add_option("--log", options.process.log,
                  "record samples, states and commands (--lockstep, no menu)");
   cli.add_option("--flight", options.process.flight,
@@ -102,14 +104,16 @@ int controllerCommand(int argc, char** argv) {
   cli.add_flag("!--no-plots", options.plots, "leave the plots out");
   return run(cli, argc, argv, [&] {
     const bool alone = options.no_menu || options.process.start || options.process.lockstep;
-    const auto refuse = [&](const char* option, bool given, const char* instead) {
-      if (given && alone)
-        throw InputError(
-            fmt::format("{}: not with --no-menu, --start or --lockstep; {}", option, instead));
+    const auto want = [&](const char* option, const char* instead) {
+      if (alone)
+        refuse(cli, {option}, fmt::format("with --no-menu, --start or --lockstep; {}", instead));
     };
-    refuse("--do", !options.commands.empty(), "want orders over the bus");
-    refuse("--out", !options.out.empty(), "want --log FILE, or ves run");
-    refuse("--plant", options.plant, "want ves plant beside it, or ves run");
+    want("--do", "want orders over the bus");
+    want("--out", "want --log FILE, or ves run");
+    want("--plant", "want ves plant beside it, or ves run");
+    want("--no-plots", "it draws none");
+    if (options.process.lockstep)
+      refuse(cli, {"--realtime"}, "beside --lockstep, which waits on no clock");
     // Lines of the menu may come through a pipe; without a word of them it is the process alone.
     const bool session = options.plant || !options.out.empty() || !options.commands.empty();
     return alone || (!session && !isatty(STDIN_FILENO)) ? serve(options) : console(options);

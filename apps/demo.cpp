@@ -18,7 +18,7 @@ int demoCommand(int argc, char** argv) {
   options.addPace(cli);
   options.addQuiet(cli);
   options.addView(cli);
-  return run(cli, argc, argv, [&] { return runExperiment(options); });
+  return run(cli, argc, argv, [&] { return runExperiment(cli, options); });
 }
 
 }  // namespace ves::app

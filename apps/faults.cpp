@@ -109,6 +109,17 @@ int faultsCommand(int argc, char** argv) {
     const Sets more = compensationOf(compensation);
     bench.sets.insert(bench.sets.begin(), more.begin(), more.end());
     catchSignals();
+    if (ticks > 0)
+      refuse(cli, {"names", "--list", "--markdown", "--lockstep", "--amplitude", "--kill"},
+             "beside --soak");
+    else
+      refuse(cli, {"--seed"}, "without --soak");
+    if (times > 0)
+      refuse(cli,
+             {"names", "--list", "--markdown", "--lockstep", "--amplitude", "--compensation",
+              "--scenario", "--set"},
+             "beside --kill, which is of z_sine");
+    if (list) refuse(cli, {"--markdown", "--amplitude", "--compensation"}, "beside --list");
     if (ticks > 0) {
       Experiment e = loadExperiment(findScenario(bench.scenario, bench.config), bench.sets);
       applyStabilityCheck(e);
@@ -124,9 +135,17 @@ int faultsCommand(int argc, char** argv) {
     }
     const auto rows = faultTable(bench);
     const bool own = scenario.empty() && bench.sets.empty();
-    for (const std::string& id : only)
-      if (std::none_of(rows.begin(), rows.end(), [&](const FaultRow& r) { return id == r.id; }))
+    for (const std::string& id : only) {
+      const auto row =
+          std::find_if(rows.begin(), rows.end(), [&](const FaultRow& r) { return id == r.id; });
+      if (row == rows.end())
         throw InputError(fmt::format("'{}': no such row, {}", id, rowMeant(id, rows)));
+      if (lockstep && row->processes)
+        throw InputError(fmt::format("{}: is of real processes, want no --lockstep", id));
+      if (!list && !own && !row->any_machine)
+        throw InputError(fmt::format(
+            "{}: is about the table's own machine or about none, want no --scenario or --set", id));
+    }
     if (!list && !lockstep) enterPrivateBus();
     if (times > 0) return kill(bench, times);
     if (markdown)
@@ -137,11 +156,12 @@ int faultsCommand(int argc, char** argv) {
     std::string left_out;
     for (const FaultRow& row : rows) {
       if (!only.empty() && std::find(only.begin(), only.end(), row.id) == only.end()) continue;
+      if (lockstep && row.processes) continue;
       if (list) {
         fmt::print("{:<5} {}\n        {}\n", row.id, row.fault, row.expected);
         continue;
       }
-      if ((lockstep && row.processes) || stop_requested) continue;
+      if (stop_requested) continue;
       if (!own && !row.any_machine) {
         left_out += (left_out.empty() ? "" : " ") + row.id;
         continue;
@@ -151,13 +171,12 @@ int faultsCommand(int argc, char** argv) {
       ++ran;
       missed += !seen.as_expected;
     }
-    if (!list && !markdown) {
+    if (!list && !markdown)
       fmt::print("{} of {} rows as expected{}\n", ran - missed, ran,
                  own ? "" : fmt::format(" on {}", bench.scenario));
-      if (!left_out.empty())
-        fmt::print("left out, as they are about the table's own machine or about none: {}\n",
-                   left_out);
-    }
+    if (!left_out.empty())
+      fmt::print(stderr, "left out, as they are about the table's own machine or about none: {}\n",
+                 left_out);
     return missed == 0 ? kDone : kTripped;
   });
 }

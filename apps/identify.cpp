@@ -152,7 +152,7 @@ int servo(const std::string& log, const std::string& scenario, const std::string
 
 int iterate(Options& load, const IterativeOptions& options, const std::string& file) {
   const Experiment e = load.load();
-  printWarnings(e);
+  printWarnings(e, load.verbose);
   fmt::print("{:>9} {:>22} {:>22}\n", "iteration", "answer - path [mm]", "[deg]");
   int n = 0;
   const IterativeResult r = compensateIteratively(e, options, [&](const IterativeChange& change) {
@@ -210,7 +210,7 @@ int identifyCommand(int argc, char** argv) {
       "masses", "mass parameters from a log in which platform and robot stand still in many poses");
   asLog(of_masses->add_option("log", name, "a run's folder, or its LCM event log"))->required();
   addScenarioOfLog(*of_masses, scenario);
-  of_masses->add_option("--out", file, "file for --masses of run, demo and controller");
+  of_masses->add_option("--out", file, "file for --masses of run and controller");
   CLI::App* of_servo = cli.add_subcommand(
       "servo",
       "gains, lag and delay of every leg from a log, of servo_identification for instance");

@@ -180,6 +180,8 @@ int keysCommand(int argc, char** argv) {
   auto* const as_schema = cli.add_flag("--schema", schema, "JSON Schema, draft 7");
   cli.add_flag("--markdown", markdown, "tables, as docs/scenario.md has them")->excludes(as_schema);
   return run(cli, argc, argv, [&] {
+    if (schema || markdown)
+      refuse(cli, {"section"}, "beside --schema and --markdown: they have all");
     const KeyMeaning root = keyMeanings(configFolder());
     if (schema) {
       printSchema(root);

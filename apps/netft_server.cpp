@@ -139,6 +139,7 @@ int netftServerCommand(int argc, char** argv) {
     catchSignals();
     const bool log = std::filesystem::is_regular_file(what) &&
                      std::filesystem::path(what).extension() != ".yaml";
+    if (log) refuse(cli, {"--url"}, "beside a log");
     std::optional<RecordedWrench> recorded;
     std::optional<Experiment> experiment;
     if (log)

@@ -17,6 +17,9 @@ int plantCommand(int argc, char** argv) {
   options.addPace(cli);
   return run(cli, argc, argv, [&] {
     const Experiment experiment = options.load();
+    if (options.process.lockstep)
+      refuse(cli, {"--realtime"}, "beside --lockstep, which waits on no clock");
+    if (options.verbose) printWarnings(experiment, true);
     options.enterBus();
     catchSignals();
     runPlant(experiment, options.process, [] { return stop_requested != 0; });

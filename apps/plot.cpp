@@ -37,12 +37,7 @@ int plotCommand(int argc, char** argv) {
       ->required();
   cli.add_option("--from", from, "[s] since the first tick")->check(inRange(0.0, 1e9));
   cli.add_option("--duration", duration, "[s]; to the end by default")->check(inRange(0.0, 1e9));
-  cli.add_option("--out", out, "SVG file")->capture_default_str()->check([](const std::string& to) {
-    const std::string ending = std::filesystem::path(to).extension().string();
-    return ending.empty() || ending == ".svg"
-               ? ""
-               : fmt::format("'{}', want a name that ends in .svg: the picture is one", to);
-  });
+  cli.add_option("--out", out, "SVG file")->capture_default_str()->check(endsWith({".svg"}));
   addScenarioOfLog(cli, scenario);
   return run(cli, argc, argv, [&] {
     constexpr std::size_t kMostPanels = 8;

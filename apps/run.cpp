@@ -40,7 +40,7 @@ int runCommand(int argc, char** argv) {
   cli.add_flag("!--no-plots", options.plots, "leave the plots out");
   return run(cli, argc, argv, [&] {
     if (options.scenario.empty()) listScenarios();
-    return runExperiment(options);
+    return runExperiment(cli, options);
   });
 }
 

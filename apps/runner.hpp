@@ -27,9 +27,16 @@ struct RunnerOptions : Options {
   bool on_bus = false;  // prepareBus() was here
 
   void addOut(CLI::App& cli) {
-    cli.add_option("--out", out, "folder for the results; a new one in ves-runs by default")
-        ->check([](const std::string& given) { return given.empty() ? "want a folder" : ""; });
-    cli.add_flag("--overwrite", overwrite, "where a run is in that folder already");
+    auto* const folder =
+        cli.add_option("--out", out, "folder for the results; a new one in ves-runs by default");
+    cli.add_flag("--overwrite", overwrite, "where a run is in that folder already")->needs(folder);
+  }
+  /// Nothing waits on a bus or a clock then.
+  bool oneProcess() const { return process.lockstep && !two_processes && !process.pace && !view; }
+  void requireUsed(const CLI::App& cli) const {
+    if (oneProcess())
+      refuse(cli, {"--url", "--private-bus", "--join", "--realtime"},
+             "beside --lockstep: it is one process");
   }
   void addView(CLI::App& cli) {
     cli.add_flag("--view", view, "show it in a browser meanwhile; prints the address");
@@ -132,8 +139,7 @@ class ViewBeside {
 inline RunResult execute(RunnerOptions& options, const Experiment& experiment,
                          LaunchOptions& launch, bool tells = true) {
   tells = tells && !options.quiet;
-  const bool one_process =
-      options.process.lockstep && !options.two_processes && !options.process.pace;
+  const bool one_process = options.oneProcess();
   catchSignals();
   Progress progress(experiment);
   RunResult result;
@@ -164,7 +170,8 @@ inline RunResult execute(RunnerOptions& options, const Experiment& experiment,
   return result;
 }
 
-inline int runExperiment(RunnerOptions& options) {
+inline int runExperiment(const CLI::App& cli, RunnerOptions& options) {
+  options.requireUsed(cli);
   if (options.process.lockstep && options.view && !options.process.pace) options.process.pace = 1.0;
   Experiment experiment = options.load();
   printWarnings(experiment, options.verbose);

@@ -68,51 +68,48 @@ struct Parameter {
   const char* name;
   const char* label;
   double least, most;
-  void (*set)(Loop& loop, const Loop& original, double value);
+  void (*set)(Loop& loop, double value);
   bool logarithmic = false;
 };
 const Parameter kParameters[] = {
     {"mass", "robot's inertia, times its own", 0.0, 10000.0,
-     [](Loop& l, const Loop& o, double v) {
-       l.robot_P = scaledDensity(v, o.robot_P);
-       l.model.robot_P = l.robot_P;
+     [](Loop& l, double v) {
+       l.robot_P = scaledDensity(v, l.robot_P);
+       l.model.robot_P = scaledDensity(v, l.model.robot_P);
      }},
     {"mass_error", "robot's inertia, times the controller's model", 0.0, 100.0,
-     [](Loop& l, const Loop& o, double v) { l.robot_P = scaledDensity(v, o.robot_P); }},
+     [](Loop& l, double v) { l.robot_P = scaledDensity(v, l.robot_P); }},
     {"contact_stiffness", "stiffness of the contact [N/m]", 1e-3, 1e12,
-     [](Loop& l, const Loop&, double v) {
+     [](Loop& l, double v) {
        l.contact->damping *= std::sqrt(v / l.contact->stiffness);
        l.contact->stiffness = v;
      },
      true},
-    {"rate", "controller rate [Hz]", 1.0, 1000.0,
-     [](Loop& l, const Loop&, double v) { l.period = 1.0 / v; }},
+    {"rate", "controller rate [Hz]", 1.0, 1000.0, [](Loop& l, double v) { l.period = 1.0 / v; }},
     {"K_P", "K_P, times its own", 0.0, 100.0,
-     [](Loop& l, const Loop& o, double v) {
-       l.velocity_gain = v * o.velocity_gain;
-       l.model.setGain(v * o.model.gain());
+     [](Loop& l, double v) {
+       l.velocity_gain *= v;
+       l.model.setGain(v * l.model.gain());
      }},
     {"gain_error", "servo gain, times the controller's model", 0.01, 100.0,
-     [](Loop& l, const Loop& o, double v) { l.velocity_gain = v * o.velocity_gain; }},
+     [](Loop& l, double v) { l.velocity_gain *= v; }},
     {"late", "wrench later than believed [ms]", -20.0, 20.0,
-     [](Loop& l, const Loop& o, double v) { l.late = o.late + 1e-3 * v; }},
+     [](Loop& l, double v) { l.late += 1e-3 * v; }},
     {"delay", "further delay [ticks]", 0.0, 50.0,
-     [](Loop& l, const Loop& o, double v) { l.delay = o.delay + static_cast<int>(v); }},
+     [](Loop& l, double v) { l.delay += static_cast<int>(v); }},
     {"filter", "cut-off of Filter 3 [rad/s]", 0.0, 10000.0,
-     [](Loop& l, const Loop&, double v) { l.filter_cutoff = v; }},
+     [](Loop& l, double v) { l.filter_cutoff = v; }},
     {"sensor", "cut-off of the sensor's filter [Hz]", 0.1, 10000.0,
-     [](Loop& l, const Loop&, double v) {
-       l.sensor_cutoff = l.model.servo.sensor_cutoff = 2.0 * M_PI * v;
-     }},
+     [](Loop& l, double v) { l.sensor_cutoff = l.model.servo.sensor_cutoff = 2.0 * M_PI * v; }},
     {"frequency", "frequencies of the base, times their own", 0.0, 1000.0,
-     [](Loop& l, const Loop& o, double v) {
-       l.base.stiffness = v * v * o.base.stiffness;
-       l.base.damping = v * o.base.damping;
+     [](Loop& l, double v) {
+       l.base.stiffness *= v * v;
+       l.base.damping *= v;
      }},
     {"modes", "modes kept", 1.0, 132.0,
-     [](Loop& l, const Loop& o, double v) {
-       l.base = softest(
-           o.base, std::clamp(static_cast<int>(v), 1, static_cast<int>(o.base.stiffness.size())));
+     [](Loop& l, double v) {
+       const auto all = static_cast<int>(l.base.stiffness.size());
+       l.base = softest(l.base, std::clamp(static_cast<int>(v), 1, all));
      }},
 };
 
@@ -202,9 +199,8 @@ int drawMap(const Experiment& e, const MapAxis& x, const MapAxis& y,
   for (int j = 0; j < kPoints; ++j) {
     for (int i = 0; i < kPoints; ++i) {
       Loop loop = original;
-      x.parameter->set(loop, original, x.at(i, kPoints));
-      const Loop half = loop;
-      y.parameter->set(loop, y.parameter == x.parameter ? original : half, y.at(j, kPoints));
+      x.parameter->set(loop, x.at(i, kPoints));
+      y.parameter->set(loop, y.at(j, kPoints));
       const DominantRoot s = dominantRoot(loop);
       csv += fmt::format("{},{},{},{}", x.at(i, kPoints), y.at(j, kPoints), s.growth, s.frequency);
       if (loop.contact) csv += fmt::format(",{}", impact(loop, speed).energy_error);
@@ -288,9 +284,8 @@ int stabilityCommand(int argc, char** argv) {
   std::string scenario, x = "mass=0.1:4", y = "frequency=0.2:3", out = "ves-runs/stability";
   map->add_option("scenario", scenario, "name in config/scenarios, or a .yaml file");
   map->add_option("--x", x,
-                  "NAME=FROM:TO: mass, mass_error, contact_stiffness, rate, K_P, late, delay, "
-                  "filter, sensor, "
-                  "frequency, modes")
+                  "NAME=FROM:TO: mass, mass_error, contact_stiffness, rate, K_P, gain_error, late, "
+                  "delay, filter, sensor, frequency, modes")
       ->capture_default_str();
   map->add_option("--y", y, "the same")->capture_default_str();
   map->add_option("--set", options.overrides, "KEY.PATH=VALUE as if it stood in the scenario")
@@ -299,7 +294,7 @@ int stabilityCommand(int argc, char** argv) {
   return run(cli, argc, argv, [&] {
     if (loop->parsed()) {
       const Experiment e = options.load();
-      printWarnings(e);
+      printWarnings(e, options.verbose);
       return showLoop(e);
     }
     if (scenario.empty()) {
@@ -310,6 +305,8 @@ int stabilityCommand(int argc, char** argv) {
       return drawPublished(makeFolder(out));
     }
     const MapAxis of_x = axisOf("--x", x), of_y = axisOf("--y", y);
+    if (of_x.parameter == of_y.parameter)
+      throw InputError(fmt::format("--y {}: is that of --x too, want another", y));
     options.scenario = scenario;
     return drawMap(options.load(), of_x, of_y, makeFolder(out));
   });

@@ -160,6 +160,12 @@ int sweepCommand(int argc, char** argv) {
     for (const std::string& option : draw) plan.draw(option);
     plan.repeat(runs);
     plan.seed(seed);
+    if (draw.empty() && runs == 1) refuse(cli, {"--seed"}, "without --draw or --runs");
+    const std::vector<std::string> varied = plan.keys();
+    for (const std::string& set : sets)
+      if (const std::string key = set.substr(0, set.find('='));
+          std::find(varied.begin(), varied.end(), key) != varied.end())
+        throw InputError(fmt::format("--set {}: is another one each run, leave it out", key));
     const auto design =
         static_cast<SweepDesign>(std::find(designs.begin(), designs.end(), laid) - designs.begin());
     plan.lay(design);

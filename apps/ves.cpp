@@ -143,16 +143,30 @@ void printUsage(FILE* to) {
 }
 
 int dispatch(int argc, char** argv) {
-  const std::string_view word = argc > 1 ? argv[1] : "";
-  for (const Command& c : kCommands)
-    if (word == c.name) return c.run(argc - 1, argv + 1);
+  std::string_view word = argc > 1 ? argv[1] : "";
+  const auto named = [&](const Command& c) { return word == c.name; };
+  if (const auto c = std::find_if(std::begin(kCommands), std::end(kCommands), named);
+      c != std::end(kCommands))
+    return c->run(argc - 1, argv + 1);
+  const bool help = word == "help" || word == "--help" || word == "-h";
+  if (help && argc == 3) {
+    word = argv[2];
+    if (const auto c = std::find_if(std::begin(kCommands), std::end(kCommands), named);
+        c != std::end(kCommands)) {
+      fmt::print("{}", printed(*c, "--help"));
+      return kDone;
+    }
+  } else if (argc > 2 && (help || word == "--version" || word == "completion" || word == "man")) {
+    fmt::print(stderr, "ves: '{}': want nothing after {}\n", argv[2], word);
+    return kBadInput;
+  }
   if (word == "--version") {
     fmt::print("ves {}\n", describeBuild());
   } else if (word == "completion") {
     printCompletion();
   } else if (word == "man") {
     printManual();
-  } else if (word == "help" || word == "--help" || word == "-h") {
+  } else if (help && argc == 2) {
     printUsage(stdout);
   } else {
     if (word.empty()) {

@@ -177,15 +177,19 @@ int viewCommand(int argc, char** argv) {
                        "folders or LCM event logs of up to four runs; none: the run on the bus"))
       ->expected(0, 4);
   auto* html = cli.add_option("--html", options.html,
-                              "write one file that a browser opens from disk, and serve nothing");
+                              "write one file that a browser opens from disk, and serve nothing")
+                   ->check(endsWith({".html"}));
   auto* svg =
       cli.add_option("--svg", options.svg, "write a drawing that moves, for a page or a README")
+          ->check(endsWith({".svg"}))
           ->excludes(html);
   auto* video = cli.add_option("--video", options.video,
                                "write a film of the page: .mp4, .webm, .gif (Chromium, ffmpeg)")
+                    ->check(endsWith({".mp4", ".webm", ".gif"}))
                     ->excludes(html)
                     ->excludes(svg);
   auto* png = cli.add_option("--png", options.png, "write a picture of the page for print, 300 dpi")
+                  ->check(endsWith({".png"}))
                   ->excludes(html)
                   ->excludes(svg)
                   ->excludes(video);
@@ -194,7 +198,7 @@ int viewCommand(int argc, char** argv) {
       ->needs(png);
   cli.add_option("--from", options.moving.from, "[s] of the log, for --svg and --video")
       ->check(inRange(0.0, 1e9));
-  cli.add_option("--to", options.moving.to, "[s]")->check(inRange(0.0, 1e9));
+  cli.add_option("--to", options.moving.to, "[s] of it")->check(inRange(0.0, 1e9));
   cli.add_option("--speed", options.film.speed, "[-] of real time, for --video")
       ->check(inRange(0.01, 100.0))
       ->needs(video);
@@ -218,15 +222,19 @@ int viewCommand(int argc, char** argv) {
     const CLI::Option* files[] = {html, svg, video, png};
     const auto* file = std::find_if(std::begin(files), std::end(files),
                                     [](const CLI::Option* o) { return o->count() > 0; });
-    if (file == std::end(files)) return servePage(options);
-    const auto refuse = [&](const char* option, std::initializer_list<const CLI::Option*> with) {
-      const bool fits = std::find(with.begin(), with.end(), *file) != with.end();
-      if (cli.get_option(option)->count() > 0 && !fits)
-        throw InputError(fmt::format("{}: means nothing beside {}", option, (*file)->get_name()));
-    };
-    refuse("--from", {svg, video});
-    refuse("--to", {svg, video});
-    refuse("--look", {video, png});
+    if (file == std::end(files)) {
+      refuse(cli, {"--from", "--to", "--look"}, "in a browser");
+      if (options.logs.empty())
+        refuse(cli, {"--rate", "--scenario"}, "without a log");
+      else
+        refuse(cli, {"--url", "--join"}, "beside a log");
+      return servePage(options);
+    }
+    const std::string beside = "beside " + (*file)->get_name();
+    if (*file != svg && *file != video) refuse(cli, {"--from", "--to"}, beside);
+    if (*file != video && *file != png) refuse(cli, {"--look"}, beside);
+    if (*file == png) refuse(cli, {"--rate"}, beside);
+    refuse(cli, {"--url", "--join", "--port", "--bind"}, beside);
     if (options.logs.empty() || (*file == svg && options.logs.size() > 1))
       throw InputError(
           fmt::format("{}: want {} log", (*file)->get_name(), *file == svg ? "one" : "a"));

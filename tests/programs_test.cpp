@@ -140,17 +140,24 @@ TEST_F(Programs, WhatIsSomethingElseIsKept) {
   const std::string log = file("a/run.lcmlog"), text = file("text");
   std::ofstream(text) << "precious\n";
   const std::string recorded = test::readText(log);
-  for (const std::string& before : {log, text}) {
-    const std::string kept = test::readText(before), in = file("a") + " ";
-    for (const std::string& command :
-         {app("collect") + in + "--out ", app("collect") + in + "--mcap ",
-          app("view") + in + "--html ", app("view") + in + "--svg ",
-          app("compare") + in + in + "--html ", app("view") + in + "--to 0.1 --video ",
-          app("srms") + "simulate free_decay --out "}) {
-      expectRefusal(command + before, "something else is there already");
-      EXPECT_EQ(test::readText(before), kept) << command;
+  const std::string in = file("a") + " ";
+  const std::pair<std::string, const char*> writers[] = {
+      {app("collect") + in + "--out ", ".csv"},
+      {app("collect") + in + "--parquet ", ".parquet"},
+      {app("collect") + in + "--mcap ", ".mcap"},
+      {app("view") + in + "--html ", ".html"},
+      {app("view") + in + "--svg ", ".svg"},
+      {app("compare") + in + in + "--html ", ".html"},
+      {app("view") + in + "--to 0.1 --video ", ".mp4"},
+      {app("srms") + "simulate free_decay --out ", ".csv"}};
+  for (const std::string& before : {log, text})
+    for (const auto& [command, ending] : writers) {
+      const std::string there = file("there") + ending;
+      fs::copy_file(before, there, fs::copy_options::overwrite_existing);
+      expectRefusal(command + there, "something else is there already");
+      EXPECT_EQ(test::readText(there), test::readText(before)) << command;
     }
-  }
+  expectRefusal(app("collect") + in + "--out " + log, "something else is there already");
   EXPECT_EQ(test::readText(log), recorded);
   for (const char* name : {"x.csv", "x.html"})  // its like
     for (int i = 0; i < 2; ++i)
@@ -168,6 +175,55 @@ TEST_F(Programs, WhatIsSomethingElseIsKept) {
                     std::string(name) + " is there already, want another or --overwrite");
     std::filesystem::rename(file("b/") + name, text);
   }
+}
+
+// Nothing that is asked for is dropped in silence.
+TEST_F(Programs, WhatAnOptionMeansNothingForIsRefused) {
+  ASSERT_EQ(run("ramp --lockstep --no-plots --quiet" + out("a")).status, 0);
+  const std::string log = file("a") + " ", to = file("x");
+  const std::pair<std::string, const char*> rows[] = {
+      {"collect " + log + "--mcap " + to + ".mcap --select z_", "--select: means nothing"},
+      {"collect " + log + "--mcap " + to + ".mcap --rate 10", "--rate: means nothing"},
+      {"collect " + log + "--list --from 1", "--from: means nothing"},
+      {"collect " + log + "--join it", "--join: means nothing"},
+      {"collect --follow --mcap " + to + ".mcap --scenario ramp", "--scenario: means nothing"},
+      {"collect " + log + "--parquet " + to + ".csv", "ends in .parquet"},
+      {"view " + log + "--look top", "--look: means nothing"},
+      {"view --from 3", "--from: means nothing"},
+      {"view --rate 10", "--rate: means nothing"},
+      {"view " + log + "--join it", "--join: means nothing"},
+      {"view " + log + "--html " + to + ".html --port 9000", "--port: means nothing"},
+      {"view " + log + "--png " + to + ".png --rate 5", "--rate: means nothing"},
+      {"view " + log + "--html " + to + ".svg", "ends in .html"},
+      {"compare " + log + log + "--html " + to, "ends in .html"},
+      {"keys legs --schema", "section: means nothing"},
+      {"run ramp --lockstep --private-bus", "--private-bus: means nothing"},
+      {"run ramp --lockstep --join it", "--join: means nothing"},
+      {"demo --lockstep --realtime", "--realtime: means nothing"},
+      {"commission puma_tilt --lockstep --url udpm://239.255.76.67:7667", "--url: means nothing"},
+      {"run ramp --lockstep --overwrite", "--overwrite requires --out"},
+      {"plant ramp --lockstep --realtime", "--realtime: means nothing"},
+      {"controller ramp --no-menu --no-plots", "--no-plots: means nothing"},
+      {"controller ramp --no-menu --start", "--start excludes --no-menu"},
+      {"conform ramp --set 'program=[{move: {}}]'", "--set program: means nothing"},
+      {"accept z_sine --lockstep --tests steps --slow 0.001", "--slow: means nothing"},
+      {"accept z_sine --lockstep --tests passes --amplitudes 0.5", "--amplitudes: means nothing"},
+      {"faults F14 --lockstep", "F14: is of real processes"},
+      {"faults F22 --set legs.K_P=2", "F22: is about the table's own machine"},
+      {"faults --kill 5 --list", "--list: means nothing"},
+      {"faults F3 --soak 10", "names: means nothing"},
+      {"faults --list --markdown", "--markdown: means nothing"},
+      {"faults --lockstep --seed 3", "--seed: means nothing"},
+      {"sweep ramp --vary legs.K_P=1,2 --seed 9", "--seed: means nothing"},
+      {"sweep ramp --vary legs.K_P=1,2 --set legs.K_P=3", "--set legs.K_P: is another one"},
+      {"sweep ramp --runs 2 --set seed=3", "--set seed: is another one"},
+      {"stability map free_decay --x mass=0.1:4 --y mass=0.2:3", "--y mass=0.2:3: is that of --x"},
+      {"replay " + log + "--with ''", "--with: is empty"},
+      {"run ramp --lockstep --out ''", "--out: is empty"}};
+  for (const auto& [arguments, says] : rows) expectRefusal(app("") + arguments, says);
+  for (const char* extra : {"--version x", "man x", "completion x", "help run x", "help nothing"})
+    EXPECT_EQ(test::sh(app("") + extra).status, 2) << extra;
+  EXPECT_EQ(test::sh(app("help") + "run").text, test::sh(app("run") + "--help").text);
 }
 
 TEST_F(Programs, TheNewestRunHasAName) {

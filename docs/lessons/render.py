@@ -123,8 +123,9 @@ def index(lessons, folder):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("lessons", nargs="*", type=pathlib.Path)
-    parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("ves-lessons"))
-    parser.add_argument("--check", action="store_true")
+    how = parser.add_mutually_exclusive_group()
+    how.add_argument("--out", type=pathlib.Path, default=pathlib.Path("ves-lessons"))
+    how.add_argument("--check", action="store_true")
     given = parser.parse_args()
     every = sorted(HERE.glob("[0-9]*.py"))
     for lesson in given.lessons:
