@@ -51,6 +51,43 @@ Transform frameOf(const Scene& scene, const std::vector<float>& picture, const s
   return {};
 }
 
+/// As a drawing is seen, written anew: from above and aside, without perspective.
+Eigen::Vector2d seen(const Vec3& p) {
+  const Vec3 eye = Vec3(0.62, -0.95, 0.5).normalized();
+  const Vec3 right = Vec3(-eye.y(), eye.x(), 0.0).normalized(), up = eye.cross(right);
+  return {right.dot(p), -up.dot(p)};
+}
+
+/// A line or a polygon of a drawing.
+struct Drawn {
+  bool closed;
+  std::vector<Eigen::Vector2d> at;
+  double width = 0.0;
+
+  bool joins(const Vec3& a, const Vec3& b) const {
+    const auto near = [&](std::size_t i, const Vec3& p) { return (at[i] - seen(p)).norm() < 3e-4; };
+    return !closed && at.size() == 2 && ((near(0, a) && near(1, b)) || (near(0, b) && near(1, a)));
+  }
+};
+
+/// In the order in which they cover each other.
+std::vector<Drawn> drawnIn(const std::string& svg) {
+  std::vector<Drawn> out;
+  const std::regex element("<(polygon|polyline) points=\"([^\"]*)\"[^>]*"),
+      width("stroke-width=\"([^\"]*)\"");
+  for (std::sregex_iterator it(svg.begin(), svg.end(), element), end; it != end; ++it) {
+    Drawn one{(*it)[1] == "polygon", {}};
+    std::istringstream points((*it)[2]);
+    for (std::string point; points >> point;)
+      one.at.emplace_back(std::stod(point), std::stod(point.substr(point.find(',') + 1)));
+    const std::string text = it->str();
+    std::smatch found;
+    if (std::regex_search(text, found, width)) one.width = std::stod(found[1]);
+    out.push_back(one);
+  }
+  return out;
+}
+
 TEST(Scene, LegsReachFromJointToJoint) {
   const RecordedRun run = puma();
   const Experiment& e = run.series.experiment;
@@ -95,6 +132,107 @@ TEST(Scene, TheToolIsAtTheEndOfTheLinks) {
   }
   for (const auto& shape : scene.description()["shapes"])
     EXPECT_TRUE(frames.count(shape["frame"])) << shape;
+}
+
+// As far as its links are long, however they are bent.
+TEST(Scene, TheReachIsThatOfAStretchedRobot) {
+  const Experiment e = test::experiment("puma_on_table_4_1");
+  const RobotModel& robot = e.plant.payload.robot;
+  const LinkPoses links = linkPoses(robot, JointVector::Constant(0.3));
+  double length = 0.0;
+  Vec3 from = Vec3::Zero();
+  for (int i = 0; i < robot.size; ++i) {
+    length += (links[i].p - from).norm();
+    from = links[i].p;
+  }
+  length += (e.robot.tool()->pose(links).p - from).norm();
+  EXPECT_NEAR(Scene(e).description()["reach"].get<double>(), length, 1e-12);
+}
+
+// The tops of a socket's boards are flush with its mouth, its floor is at its depth.
+TEST(Scene, ASocketIsAHoleInABoard) {
+  const Experiment e = test::experiment("contact_peg_puma");
+  const FixedBody& body = e.plant.task.world->environment.bodies.front();
+  const Socket& socket = std::get<Socket>(body.shape);
+  const Scene scene(e);
+  int boards = 0, floors = 0;
+  for (const auto& shape : scene.description()["shapes"]) {
+    if (!shape.contains("world")) continue;
+    ASSERT_EQ(shape["kind"], "box");
+    const auto& p = shape["position"];
+    const Vec3 at = inverse(body.X_IB) * Vec3(p[0], p[1], p[2]);
+    const double top = at.z() + 0.5 * shape["size"][2].get<double>();
+    if (at.head<2>().norm() < 1e-9) {
+      ++floors;
+      EXPECT_NEAR(top, -socket.depth, 1e-12);
+    } else {
+      ++boards;
+      EXPECT_NEAR(top, 0.0, 1e-12);
+      const Vec3 half = 0.5 * Vec3(shape["size"][0], shape["size"][1], shape["size"][2]);
+      EXPECT_NEAR((at.cwiseAbs() - half).head<2>().maxCoeff(), socket.radius + socket.chamfer,
+                  1e-12);
+    }
+  }
+  EXPECT_EQ(boards, 4);
+  EXPECT_EQ(floors, 1);
+}
+
+TEST(Scene, APushIsShownWhileItLasts) {
+  const RecordedRun run = puma();
+  const Scene scene(run.series.experiment);
+  const auto d = scene.description();
+  Row row = run.series.rows.back();
+  const auto shown = [&](const std::string& name) {
+    std::size_t at = 7 * d["frames"].size() + 3 * d["arm"].size();
+    for (const auto& one : d["scalars"]) {
+      if (one == name) return static_cast<double>(scene.picture(row, {})[at]);
+      ++at;
+    }
+    ADD_FAILURE() << name;
+    return 0.0;
+  };
+  row.truth.pushes = 1;
+  row.truth.push_began_ns = row.truth.header.time_ns - 400'000'000;
+  row.truth.push_on = 1;
+  row.truth.push_link = 3;
+  for (int i = 0; i < 3; ++i) {
+    row.truth.push_force[i] = 1.0 + i;
+    row.truth.push_point[i] = 0.5 + i;
+  }
+  for (const double duration : {0.5, 0.3}) {  // [s] that it lasts
+    row.truth.push_duration = duration;
+    const std::map<std::string, double> due = {
+        {"push_on", 1.0}, {"push_link", 3.0}, {"push_x", 0.5},  {"push_y", 1.5},
+        {"push_z", 2.5},  {"push_fx", 1.0},   {"push_fy", 2.0}, {"push_fz", 3.0}};
+    for (const auto& [name, value] : due)
+      if (duration > 0.4)
+        EXPECT_EQ(shown(name), value) << name;
+      else
+        EXPECT_TRUE(std::isnan(shown(name))) << name;
+  }
+}
+
+// What of its stroke a leg has left: all of it in the middle.
+TEST(Scene, AMarginIsOfHalfAStroke) {
+  const RecordedRun run = puma();
+  const Scene scene(run.series.experiment);
+  const SafetyLimits& limits = run.series.experiment.controller.safety;
+  const auto d = scene.description();
+  Row row = run.series.rows.back();
+  for (std::size_t i = 0; i < kLegs; ++i) {
+    std::size_t at = 7 * d["frames"].size() + 3 * d["arm"].size();
+    for (const auto& one : d["scalars"]) {
+      if (one == fmt::format("leg{}_margin", i + 1)) break;
+      ++at;
+    }
+    ASSERT_LT(at, scene.width());
+    for (const auto& [length, margin] : {std::pair(0.5 * (limits.leg_min + limits.leg_max), 1.0),
+                                         {limits.leg_min, 0.0},
+                                         {0.75 * limits.leg_max + 0.25 * limits.leg_min, 0.5}}) {
+      row.state.leg_measured[i] = length;
+      EXPECT_NEAR(scene.picture(row, {})[at], margin, 1e-6) << i;
+    }
+  }
 }
 
 TEST(Scene, TheBaseIsThereInAdmittanceControlOnly) {
@@ -280,6 +418,32 @@ TEST_F(Looks, AreDrawnWhereTheDescriptionHasThem) {
   ASSERT_EQ(scene().warnings().size(), 1u);
   EXPECT_EQ(scene().warnings()[0],
             "package://arm/meshes/none.stl: not found, its link is drawn as a line");
+}
+
+TEST_F(Looks, TheFirstLinkThatMovesTakesItsShapesAlong) {
+  std::string text = test::readText((folder_ / "dressed.urdf").string());
+  const std::string head = "<link name=\"link_1\">";
+  ASSERT_NE(text.find(head), std::string::npos);
+  text.insert(
+      text.find(head) + head.size(),
+      "<visual><origin xyz='0 0.2 0'/><geometry><sphere radius='0.05'/></geometry></visual>");
+  write("dressed.urdf", text);
+  ASSERT_EQ(shapes("sphere", "link1").size(), 1u);
+  EXPECT_EQ(shapes("sphere", "link1")[0]["position"].dump(), "[0.0,0.2,0.0]");
+  EXPECT_TRUE(shapes("sphere", "platform").empty());
+}
+
+// A box is a stroke along its longest side, as thick as the other two are in the mean.
+TEST_F(Looks, ADrawingShowsABoxAlongItsLongestSide) {
+  const Experiment e =
+      test::experiment("puma_on_table_4_1", {"robot.urdf=" + (folder_ / "dressed.urdf").string()});
+  const Transform X = e.plant.geometry.fromHome(Pose()) * e.plant.payload.X_PL0();
+  const std::vector<Drawn> all = drawnIn(stillAtStart(e, StillView::kPlatform));
+  const auto box = std::find_if(all.begin(), all.end(), [&](const Drawn& d) {
+    return d.joins(X * Vec3(0.0, 0.0, -0.15), X * Vec3(0.0, 0.0, 0.15));
+  });
+  ASSERT_NE(box, all.end());
+  EXPECT_NEAR(box->width, std::sqrt(0.1 * 0.2), 1e-4);
 }
 
 // A material of its own, or one that the robot, or a shape before, has named.
@@ -493,6 +657,50 @@ TEST(Still, IsADrawingOfEveryBody) {
   EXPECT_GT(width(arm), 7.0);
 }
 
+TEST(Still, ShowsLegsBetweenPlatesAndAllOfItFits) {
+  const Experiment e = test::experiment("puma_on_table_4_1");
+  const std::string svg = stillAtStart(e, StillView::kPlatform);
+  const std::vector<Drawn> all = drawnIn(svg);
+  const Geometry& g = e.plant.geometry;
+  const Transform X_IP = g.fromHome(Pose());
+  const auto plate = [&](const Vec3& corner) {
+    return std::find_if(all.begin(), all.end(), [&](const Drawn& d) {
+      return d.closed && std::any_of(d.at.begin(), d.at.end(), [&](const Eigen::Vector2d& p) {
+               return (p - seen(corner)).norm() < 3e-4;
+             });
+    });
+  };
+  const auto platform = plate(X_IP * g.p_PPi_P[0]);
+  ASSERT_NE(platform, all.end());
+  const auto depth = [](const Vec3& p) { return Vec3(0.62, -0.95, 0.5).dot(p); };
+  Vec3 middle = Vec3::Zero();
+  for (const Vec3& p : g.p_PPi_P) middle += X_IP * p / kLegs;
+  for (std::size_t i = 0; i < kLegs; ++i) {
+    const Vec3 from = g.p_IBi_I[i], to = X_IP * g.p_PPi_P[i], along = (to - from).normalized();
+    const double least = e.plant.actuator.length_min;
+    const auto line = [&](const Vec3& a, const Vec3& b) {
+      return std::find_if(all.begin(), all.end(), [&](const Drawn& d) { return d.joins(a, b); });
+    };
+    const auto cylinder = line(from, from + 0.85 * least * along);
+    ASSERT_NE(cylinder, all.end()) << i;
+    // What is nearer to the eye covers what is behind.
+    EXPECT_EQ(cylinder > platform, depth(from + 0.425 * least * along) > depth(middle)) << i;
+    EXPECT_NE(line(to, to - least * along), all.end()) << i;
+  }
+  Eigen::AlignedBox2d box;
+  for (const Drawn& d : all)
+    for (const Eigen::Vector2d& p : d.at)
+      for (const double side : {-0.5, 0.5})
+        box.extend(Eigen::Vector2d(p + Eigen::Vector2d::Constant(side * d.width)));
+  double x, y, w, h;
+  ASSERT_EQ(std::sscanf(svg.c_str(), "<svg viewBox=\"%lf %lf %lf %lf", &x, &y, &w, &h), 4);
+  const double margin = 0.03 * box.diagonal().norm();
+  EXPECT_NEAR(x, box.min().x() - margin, 1e-3);
+  EXPECT_NEAR(y, box.min().y() - margin, 1e-3);
+  EXPECT_NEAR(w, box.sizes().x() + 2.0 * margin, 1e-3);
+  EXPECT_NEAR(h, box.sizes().y() + 2.0 * margin, 1e-3);
+}
+
 // Every drawing shows the joints of the platform where the log says that they were.
 TEST(Moving, FollowsTheRun) {
   const RecordedRun run = puma();
@@ -507,8 +715,6 @@ TEST(Moving, FollowsTheRun) {
   ASSERT_NE(animate, std::string::npos);
   const std::size_t begin = svg.find("values=\"", animate) + 8;
   std::istringstream drawings(svg.substr(begin, svg.find('"', begin) - begin));
-  const Vec3 eye = Vec3(0.62, -0.95, 0.5).normalized();
-  const Vec3 right = Vec3(-eye.y(), eye.x(), 0.0).normalized(), up = eye.cross(right);
   const Geometry& g = run.series.experiment.plant.geometry;
   int k = 0;
   for (std::string drawing; std::getline(drawings, drawing, ';'); ++k) {
@@ -516,13 +722,23 @@ TEST(Moving, FollowsTheRun) {
                                   [&](const Row& r) { return r.t >= from + k / rate - 1e-6; });
     const Transform X_IP = g.fromHome(Pose::from(Vec6::Map(row->truth.x)));
     for (const Vec3& p : g.p_PPi_P) {
-      const Vec3 at = X_IP * p;
-      EXPECT_NE(drawing.find(fmt::format("{:.4f},{:.4f}", right.dot(at), -up.dot(at))),
-                std::string::npos)
-          << k;
+      const Eigen::Vector2d at = seen(X_IP * p);
+      EXPECT_NE(drawing.find(fmt::format("{:.4f},{:.4f}", at.x(), at.y())), std::string::npos) << k;
     }
   }
   EXPECT_EQ(k, 17);
+  // A line from each caption to what it tells of.
+  const auto first = std::find_if(run.series.rows.begin(), run.series.rows.end(),
+                                  [&](const Row& r) { return r.t >= from - 1e-6; });
+  const Transform X_IP = g.fromHome(Pose::from(Vec6::Map(first->truth.x)));
+  const Vec3 corner = X_IP * g.p_PPi_P[0];
+  const std::vector<Drawn> all = drawnIn(svg);
+  for (const Vec3& told : {corner, Vec3(0.5 * (corner + g.p_IBi_I[0])),
+                           Vec3(X_IP * run.series.experiment.plant.payload.X_PS.p)})
+    EXPECT_TRUE(std::any_of(all.begin(), all.end(), [&](const Drawn& d) {
+      return d.at.size() == 2 && (d.at[0] - seen(told)).norm() < 2e-3 &&
+             d.at[1].x() > seen(told).x();
+    }));
   EXPECT_EQ(moving(run.series, {5.0, 5.0, rate}).find("<animate"), std::string::npos);
   EXPECT_THROW(moving(run.series, {500.0, 501.0, rate}), InputError);
 }
@@ -630,6 +846,14 @@ TEST(Page, HasEveryTickOfEveryColumn) {
     }
   }
   EXPECT_GT(seen, 60u);
+  // And the base in free space, where there is one.
+  const std::size_t n = shown["curves"].size();
+  const char* const base[] = {"x_base_m",       "y_base_m",      "z_base_m",
+                              "alpha_base_rad", "beta_base_rad", "gamma_base_rad"};
+  for (std::size_t i = 0; i < 6; ++i) {
+    EXPECT_EQ(shown["curves"][n - 6 + i]["name"], base[i]);
+    EXPECT_TRUE(shown["curves"][n - 6 + i].contains("counts")) << base[i];
+  }
 }
 
 TEST(Page, HasAPictureForEveryInstantThatCanBeSeen) {

@@ -15,12 +15,14 @@ with a reason in equivalent.txt. Everything else is in build/mutation.
 import argparse
 import collections
 import concurrent.futures
+import contextlib
 import dataclasses
 import json
 import os
 import pathlib
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -232,17 +234,21 @@ def attack(record, tests, before):
 
 def noticed(record, binary, names, allowed):
     """The test that fails with the mutant, or None."""
-    try:
-        done = subprocess.run(
+    with subprocess.Popen(
             command(binary, names), env=environment(VES_MUTANT=str(record["id"])),
-            cwd=BUILD / "tests", stdin=subprocess.DEVNULL, capture_output=True, text=True,
-            errors="replace", timeout=allowed)
-    except subprocess.TimeoutExpired:
-        return f"{binary}: time out"
-    if done.returncode == 0:
+            cwd=BUILD / "tests", stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT, text=True, errors="replace", start_new_session=True) as test:
+        try:
+            printed, _ = test.communicate(timeout=allowed)
+        except subprocess.TimeoutExpired:
+            return f"{binary}: time out"
+        finally:  # and whatever it has started
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(test.pid, signal.SIGKILL)
+    if test.returncode == 0:
         return None
-    failed = re.search(r"\[  FAILED  \] (\S+)", done.stdout)
-    return failed.group(1).rstrip(",") if failed else f"{binary}: status {done.returncode}"
+    failed = re.search(r"\[  FAILED  \] (\S+)", printed)
+    return failed.group(1).rstrip(",") if failed else f"{binary}: status {test.returncode}"
 
 
 def known_results():
