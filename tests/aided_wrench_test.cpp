@@ -311,18 +311,10 @@ ResidualNoise noiseOfFive() {
   return n;
 }
 
-/// Index of a mean over so many samples.
-std::size_t over(int samples) {
-  for (std::size_t i = 0; i < ResidualGate::kMeans.size(); ++i)
-    if (ResidualGate::kMeans[i] == samples) return i;
-  ADD_FAILURE() << samples;
-  return 0;
-}
-
 TEST(ResidualGate, PassesWhatIsMoreThanNoiseAndWhatIsNotKnown) {
   const ResidualGate gate(config());
   const auto exceeds = [&](int samples, double mean, double unknown, int channel) {
-    return gate.exceeds(over(samples), mean * Vec6::Unit(channel), noiseOfFive(),
+    return gate.exceeds(samples, mean * Vec6::Unit(channel), noiseOfFive(),
                         Vec6::Constant(unknown));
   };
   // Bounds: 4.5 * sqrt(25 / n + unknown) for means of n.
@@ -334,6 +326,8 @@ TEST(ResidualGate, PassesWhatIsMoreThanNoiseAndWhatIsNotKnown) {
       EXPECT_FALSE(exceeds(samples, -0.999 * most, unknown, channel)) << samples;
       EXPECT_TRUE(exceeds(samples, 1.001 * most, unknown, channel)) << samples;
       EXPECT_TRUE(exceeds(samples, -1.001 * most, unknown, channel)) << samples;
+      const Vec6 two = 1.5 * most * Vec6::Unit(channel) - 0.4 * most * Vec6::Unit(2);
+      EXPECT_NEAR(gate.excess(samples, two, noiseOfFive(), Vec6::Constant(unknown)), 1.5, 1e-3);
     }
 }
 
@@ -341,15 +335,15 @@ TEST(ResidualGate, ANumberThatIsNonePasses) {  // so that the safety checks see 
   const ResidualGate gate(config());
   Vec6 residual = Vec6::Zero();
   residual(4) = std::numeric_limits<double>::quiet_NaN();
-  for (std::size_t i = 0; i < ResidualGate::kMeans.size(); ++i)
-    EXPECT_TRUE(gate.exceeds(i, residual, noiseOfFive(), Vec6::Zero()));
+  for (const int samples : ResidualGate::kMeans)
+    EXPECT_TRUE(gate.exceeds(samples, residual, noiseOfFive(), Vec6::Zero()));
 }
 
 TEST(ResidualGate, AllowsForTheLegsAndTheWeight) {
   const ControllerConfig c = config();
   const ResidualGate gate(c);
   const auto passes = [&](double residual, const ResidualNoise& noise) {
-    return gate.exceeds(0, residual * Vec6::Unit(0), noise, Vec6::Constant(0.25));
+    return gate.exceeds(1, residual * Vec6::Unit(0), noise, Vec6::Constant(0.25));
   };
   ResidualNoise noise = noiseOfFive();
   noise.weight.setConstant(75.0);  // 4.5 sqrt(100.25)

@@ -587,10 +587,11 @@ TEST_F(Emulation, AnAidedWrenchComesInAndGoesOutWithTheCompensation) {
 /// A step of one channel of the sensor, two seconds into admittance control.
 struct ForceStep {
   const char* scenario;
-  int channel;      // 1 to 6
-  double force;     // [N]
-  double duration;  // [s]
-  double admitted;  // [s] of admittance control
+  int channel;         // 1 to 6
+  double force;        // [N]
+  double duration;     // [s]
+  double admitted;     // [s] of admittance control
+  double grows = 0.0;  // [N] more from half of the duration on
 };
 
 /// By seed, what share of the base's motion that the step makes without noise and aid is left of it
@@ -598,13 +599,15 @@ struct ForceStep {
 std::vector<double> sharesKept(const ForceStep& step, int seeds,
                                const std::function<Series(const Experiment&)>& run) {
   const double sensitivity = step.channel == 3 ? 0.17115e-6 : 0.66719e-6,  // ves.yaml, sensor
-      counts = step.force * sensitivity * 10.0 * 1000.0 * 32768.0 / 10.0;
+      newton = sensitivity * 10.0 * 1000.0 * 32768.0 / 10.0;               // [count]
   const auto motion = [&](const std::vector<std::string>& more, bool steps) {
     const std::string faults =
         steps ? fmt::format(
                     ", faults: [{{at_s: 2, duration_s: {}, fault: wrench_step, which: {}, "
+                    "counts: {}}}, {{at_s: {}, duration_s: {}, fault: wrench_step, which: {}, "
                     "counts: {}}}]",
-                    step.duration, step.channel, counts)
+                    step.duration, step.channel, step.force * newton, 2.0 + 0.5 * step.duration,
+                    0.5 * step.duration, step.channel, step.grows * newton)
               : "";
     std::vector<Vec3> x;
     for (const Row& row :
@@ -651,6 +654,20 @@ TEST_F(Emulation, AnAidedWrenchLetsAPushThatNoModelKnowsPass) {
   EXPECT_LT(meanOf(shares), 1.05);
 }
 
+// What was withheld of a push before it was found is made up for, from where it began on.
+TEST_F(Emulation, APushIsMadeUpForFromItsBeginning) {
+  const auto kept = [&](double duration, std::initializer_list<int> channels) {
+    double sum = 0.0;
+    for (const char* scenario : {"srms_low_hover_puma", "srms_capture_doss"})
+      for (const int channel : channels)
+        sum += meanOf(sharesKept({scenario, channel, 5.0, duration, 8.0}, 4,
+                                 [&](const Experiment& e) { return run(e); }));
+    return sum / (2.0 * static_cast<double>(channels.size()));
+  };
+  EXPECT_NEAR(kept(1.0, {1, 3}), 1.0, 0.045);
+  EXPECT_GT(kept(0.1, {3}), 0.7);  // 0.5 N s, beside 1 N of noise a sample
+}
+
 // 1 N for 5 s, in x with 0.25 N of noise a sample and in z with 1 N of it.
 TEST_F(Emulation, AnAidedWrenchFindsASmallForceThatLasts) {
   for (const char* scenario : {"srms_low_hover_puma", "srms_capture_doss"}) {
@@ -664,6 +681,46 @@ TEST_F(Emulation, AnAidedWrenchFindsASmallForceThatLasts) {
       EXPECT_LT(share, 1.2) << scenario;
     }
   }
+}
+
+// Which only its long means show: none of the noise passes with it, it pushes along the sensor's
+// axes, and where it has gone so does what passes.
+TEST_F(Emulation, AForceThatOnlyLongMeansShowPassesAsItsMean) {
+  const double newton = 0.66719e-6 * 10.0 * 1000.0 * 32768.0 / 10.0;  // [count], ves.yaml
+  const double turned = 25.0 * kDegree;
+  for (const double yaw : {-turned, turned}) {
+    Vec3 mean = Vec3::Zero();
+    for (int seed = 1; seed <= 3; ++seed) {
+      const Series series = run(experiment(
+          "satellite_puma", with(kCompensated, with(kAidedWrench, {fmt::format("seed={}", seed)})),
+          with({fmt::format("program=[{{move: {{to: {{gamma_deg: {}}}}}}}, {{calibration: {{}}}}, "
+                            "{{admittance: {{duration_s: 14}}, faults: [{{at_s: 1, duration_s: 6, "
+                            "fault: wrench_step, which: 1, counts: {}}}]}}]",
+                            yaw / kDegree, 0.6 * newton)},
+               kMean)));
+      std::vector<Vec3> beyond;  // [N] of the joints' reaction, tick by tick
+      for (const Row& row : series.rows)
+        if (inAdmittance(row.state)) {
+          EXPECT_TRUE(row.state.withholds) << row.t;
+          beyond.push_back(Vec3::Map(row.state.dynamic) - Vec3::Map(row.state.reaction));
+        }
+      ASSERT_EQ(beyond.size(), 1400u);
+      mean += beyond[680] / 3.0;
+      EXPECT_EQ(beyond.back().norm(), 0.0) << seed;
+    }
+    const double along = std::cos(yaw) * mean.x() + std::sin(yaw) * mean.y();  // the sensor's x
+    EXPECT_NEAR(along, 0.55, 0.1);
+    EXPECT_NEAR(std::cos(yaw) * mean.y() - std::sin(yaw) * mean.x(), 0.0, 0.12);
+  }
+}
+
+// One that grows: of the time before that was found, only what it has grown by is made up for.
+TEST_F(Emulation, AnAidedWrenchFindsThatAForceHasGrown) {
+  for (const char* scenario : {"srms_low_hover_puma", "srms_capture_doss"})
+    EXPECT_NEAR(meanOf(sharesKept({scenario, 1, 0.7, 8.0, 12.0, 0.7}, 8,
+                                  [&](const Experiment& e) { return run(e); })),
+                0.93, 0.07)
+        << scenario;
 }
 
 // The sensor's zero has moved between two calibrations: that is no force, and no mass.
@@ -717,32 +774,35 @@ TEST_F(Emulation, ATareTakesADriftFromAnAidedWrenchToo) {
   EXPECT_EQ(withheld, of);
 }
 
-// One that has all but gone is none: what it was does not push on.
+// One that has all but gone is none: what it was does not push on. Of the first a mean shows that
+// it has changed, of the second none does.
 TEST_F(Emulation, AForceThatLastedDoesNotPushOn) {
   const double newton = 0.66719e-6 * 10.0 * 1000.0 * 32768.0 / 10.0;  // [count], ves.yaml
-  int found = 0, gone = 0;
-  for (int seed = 1; seed <= 4; ++seed) {
-    const Series series = run(experiment(
-        "srms_low_hover_puma",
-        with(kCompensated, with(kAidedWrench, {fmt::format("seed={}", seed)})),
-        with({"base.keep_modes=6",
-              fmt::format(
-                  "program=[{{move: {{}}}}, {{calibration: {{}}}}, {{admittance: {{duration_s: "
-                  "12}}, faults: "
-                  "[{{at_s: 2, duration_s: 10, fault: wrench_step, which: 1, counts: {}}}, "
-                  "{{at_s: 5, duration_s: 10, fault: wrench_step, which: 1, counts: {}}}]}}]",
-                  newton, -0.85 * newton)},
-             kMean)));
-    std::vector<double> beyond;  // [N] of the joints' reaction, tick by tick
-    for (const Row& row : series.rows)
-      if (inAdmittance(row.state) && row.state.withholds)
-        beyond.push_back(row.state.dynamic[0] - row.state.reaction[0]);
-    ASSERT_GT(beyond.size(), 1000u);
-    found += beyond[480] > 0.7 && beyond[480] < 1.2;
-    gone += std::all_of(beyond.end() - 200, beyond.end(), [](double f) { return f == 0.0; });
+  for (const auto& [force, left] : {std::pair(1.0, 0.15), {0.45, 0.33}}) {
+    int found = 0, gone = 0;
+    for (int seed = 1; seed <= 4; ++seed) {
+      const Series series = run(experiment(
+          "srms_low_hover_puma",
+          with(kCompensated, with(kAidedWrench, {fmt::format("seed={}", seed)})),
+          with({"base.keep_modes=6",
+                fmt::format(
+                    "program=[{{move: {{}}}}, {{calibration: {{}}}}, {{admittance: {{duration_s: "
+                    "14}}, faults: "
+                    "[{{at_s: 2, duration_s: 12, fault: wrench_step, which: 1, counts: {}}}, "
+                    "{{at_s: 6, duration_s: 12, fault: wrench_step, which: 1, counts: {}}}]}}]",
+                    force * newton, (left - 1.0) * force * newton)},
+               kMean)));
+      std::vector<double> beyond;  // [N] of the joints' reaction, tick by tick
+      for (const Row& row : series.rows)
+        if (inAdmittance(row.state) && row.state.withholds)
+          beyond.push_back(row.state.dynamic[0] - row.state.reaction[0]);
+      ASSERT_GT(beyond.size(), 1200u);
+      found += beyond[580] > 0.7 * force && beyond[580] < 1.2 * force;
+      gone += std::all_of(beyond.end() - 100, beyond.end(), [](double f) { return f == 0.0; });
+    }
+    EXPECT_EQ(found, 4) << force;
+    EXPECT_GE(gone, 3) << force;
   }
-  EXPECT_EQ(found, 4);
-  EXPECT_GE(gone, 3);
 }
 
 TEST_F(Emulation, LoopModelKnowsTheCompensation) {

@@ -60,11 +60,21 @@ Vec6 variance(int n, const ResidualNoise& noise) {
 
 }  // namespace
 
-bool ResidualGate::exceeds(std::size_t i, const Vec6& mean, const ResidualNoise& noise,
+Vec6 ResidualGate::most(int samples, const ResidualNoise& noise,
+                        const Vec6& unknown) const noexcept {
+  std::size_t i = kMeans.size() - 1;
+  while (samples < kMeans[i]) --i;  // a leg is felt less in a longer mean
+  return deviations_ * (variance(samples, noise) + unknown).cwiseSqrt() + felt_[i] * noise.legs;
+}
+
+bool ResidualGate::exceeds(int samples, const Vec6& mean, const ResidualNoise& noise,
                            const Vec6& unknown) const noexcept {
-  const Vec6 most =
-      deviations_ * (variance(kMeans[i], noise) + unknown).cwiseSqrt() + felt_[i] * noise.legs;
-  return !(mean.cwiseAbs().array() <= most.array()).all();
+  return !(mean.cwiseAbs().array() <= most(samples, noise, unknown).array()).all();
+}
+
+double ResidualGate::excess(int samples, const Vec6& mean, const ResidualNoise& noise,
+                            const Vec6& unknown) const noexcept {
+  return mean.cwiseAbs().cwiseQuotient(most(samples, noise, unknown)).maxCoeff();
 }
 
 namespace {
@@ -225,7 +235,7 @@ void AidedWrench::take(const Input& in, const Mat6& counts_per_wrench,
   const Vec6 y = counts_per_wrench * residual.stacked() + in.bias.learnt(),
              beyond = weight_ * (belief_.parameters() - used_),
              left = y - belief_.bias() - counts_per_wrench * beyond - lasting_.mean;
-  if (gate_.exceeds(0, left, noise_, unknown_)) {
+  if (gate_.exceeds(1, left, noise_, unknown_)) {
     open(belief_, std::max(0, in_group_) + 1);
     return;
   }
@@ -267,10 +277,11 @@ void AidedWrench::endGroup(const Mat6& counts_per_wrench) noexcept {
   weight_before_ = weight_;
   unknown_ = belief_.variance(one);
   if (isForce(1, belief_)) return;
+  if (groups_ >= 2 && isForce(2, beliefs_[(groups_ - 2) / kGroupsOfBlock % kBlocks])) return;
   if (groups_ % kGroupsOfBlock != 0) return;
 
   const std::size_t block = groups_ / kGroupsOfBlock - 1;
-  for (std::size_t i = 2; i < ResidualGate::kMeans.size(); ++i) {
+  for (std::size_t i = 3; i < ResidualGate::kMeans.size(); ++i) {
     const auto blocks =
         static_cast<std::size_t>(ResidualGate::kMeans[i]) / (kGroupsOfBlock * Lesson::kGroup);
     if (block + 1 >= blocks && isForce(i, beliefs_[(block + 1 - blocks) % kBlocks])) return;
@@ -302,8 +313,8 @@ void AidedWrench::refineLasting() noexcept {
     const double found = lasting_.samples, since = groups * Lesson::kGroup;
     lasting_.mean = (found * lasting_.found + since * mean) / (found + since);
   }
-  if (n == Lesson::kGroups && !gate_.exceeds(ResidualGate::kMeans.size() - 1, 2.0 * mean, noise_,
-                                             belief_.variance(columns)))
+  if (n == Lesson::kGroups &&
+      !gate_.exceeds(ResidualGate::kMeans.back(), 2.0 * mean, noise_, belief_.variance(columns)))
     restart();
 }
 
@@ -321,20 +332,46 @@ void AidedWrench::doubtHand(const Mat6& counts_per_wrench) noexcept {
   unknown_ = belief_.variance(weight);
 }
 
-/// Judged by what was known `before`.
+/// The last groups, by what was known `before`.
+AidedWrench::Window AidedWrench::window(std::size_t groups,
+                                        const MassBelief& before) const noexcept {
+  const Sum &now = sums_[groups_ % sums_.size()], &then = sums_[(groups_ - groups) % sums_.size()];
+  const MassColumns columns = (now.columns - then.columns) / static_cast<double>(groups);
+  return {static_cast<int>(groups) * Lesson::kGroup,
+          before.unexplained(columns, (now.y - then.y) / static_cast<double>(groups)),
+          before.variance(columns)};
+}
+
+/// Judged by what was known `before`. It began with the block from which on the mean is farthest
+/// beyond what would be noise.
 bool AidedWrench::isForce(std::size_t mean, const MassBelief& before) noexcept {
   const int samples = ResidualGate::kMeans[mean];
   const auto n = static_cast<std::size_t>(samples / Lesson::kGroup);
-  const Sum &now = sums_[groups_ % sums_.size()], &then = sums_[(groups_ - n) % sums_.size()];
-  const MassColumns columns = (now.columns - then.columns) / static_cast<double>(n);
-  const Vec6 all = before.unexplained(columns, (now.y - then.y) / static_cast<double>(n)),
-             unknown = before.variance(columns);
-  if (!gate_.exceeds(mean, all - lasting_.mean, noise_, unknown)) return false;
-  open(before, samples);
+  Window best = window(n, before);
+  const auto excess = [&](const Window& w) {
+    return gate_.excess(w.samples, w.mean - lasting_.mean, noise_, w.unknown);
+  };
+  if (!gate_.exceeds(samples, best.mean - lasting_.mean, noise_, best.unknown)) return false;
+  const MassBelief* known = &before;
+  double farthest = excess(best);
+  for (std::size_t block = (groups_ - 1) / kGroupsOfBlock + 1; block-- > 0;) {
+    const std::size_t groups = groups_ - block * kGroupsOfBlock;
+    if (groups > Lesson::kGroups) break;
+    const MassBelief& then = beliefs_[block % kBlocks];
+    const Window longer = window(groups, then);
+    if (groups <= n || !(excess(longer) > farthest)) continue;
+    farthest = excess(longer);
+    best = longer;
+    known = &then;
+  }
+  const bool lasts = gate_.exceeds(best.samples, best.mean, noise_, best.unknown);
+  // The sample before the first group, too, where it began with that: it was withheld.
+  const bool all = best.samples == static_cast<int>(groups_) * Lesson::kGroup;
+  open(*known, best.samples + (all ? 1 : 0));
   if (mean < ResidualGate::kLasting) return true;
   open_ = 0;
   withholds_ = true;
-  if (gate_.exceeds(mean, all, noise_, unknown)) lasting_ = {all, all, samples};
+  if (lasts) lasting_ = {best.mean, best.mean, best.samples};
   return true;
 }
 

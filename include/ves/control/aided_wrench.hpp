@@ -32,18 +32,23 @@ struct ResidualNoise {
 class ResidualGate {
  public:
   /// [-] samples: one, and groups of Lesson::kGroup.
-  static constexpr std::array<int, 5> kMeans = {1, 5, 20, 60, 200};
+  static constexpr std::array<int, 6> kMeans = {1, 5, 10, 20, 60, 200};
   /// What only means from this one on show is a force that lasts.
-  static constexpr std::size_t kLasting = 3;
+  static constexpr std::size_t kLasting = 4;
 
   explicit ResidualGate(const ControllerConfig& config);
 
-  /// `mean` [count] over kMeans[i] samples; `unknown` [count^2] its variance for want of knowledge
+  /// `mean` [count] over so many samples; `unknown` [count^2] its variance for want of knowledge
   /// of masses and bias.
-  bool exceeds(std::size_t i, const Vec6& mean, const ResidualNoise& noise,
+  bool exceeds(int samples, const Vec6& mean, const ResidualNoise& noise,
                const Vec6& unknown) const noexcept;
+  /// [-] of the channel that is farthest from 0, in terms of what would be noise.
+  double excess(int samples, const Vec6& mean, const ResidualNoise& noise,
+                const Vec6& unknown) const noexcept;
 
  private:
+  Vec6 most(int samples, const ResidualNoise& noise, const Vec6& unknown) const noexcept;
+
   double deviations_;                         // [-]
   std::array<double, kMeans.size()> felt_{};  // [1/s] largestFelt()
 };
@@ -108,12 +113,19 @@ class AidedWrench {
     Vec6 y = Vec6::Zero();
     double time = 0.0;  // [s]
   };
+  /// What is left of the last samples.
+  struct Window {
+    int samples;
+    Vec6 mean;     // [count]
+    Vec6 unknown;  // [count^2] its variance for want of knowledge
+  };
   static constexpr std::size_t kGroupsOfBlock = 4;                          // what is learnt from
   static constexpr std::size_t kBlocks = Lesson::kGroups / kGroupsOfBlock;  // at most
 
   void calibrate(const Input& in) noexcept;
   void take(const Input& in, const Mat6& counts_per_wrench, const Wrench& residual) noexcept;
   void endGroup(const Mat6& counts_per_wrench) noexcept;
+  Window window(std::size_t groups, const MassBelief& before) const noexcept;
   bool isForce(std::size_t mean, const MassBelief& before) noexcept;
   void open(const MassBelief& before, int samples) noexcept;
   void refineLasting() noexcept;
