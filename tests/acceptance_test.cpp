@@ -493,6 +493,14 @@ TEST_F(Accept, RefusesLimitsThatMeanNothing) {
   refused("limits: [{quantity: gain, least: .nan}]\n", "least");
   refused("limit: []\n", "limits");
   expectRefusal(app("accept") + "z_sine --lockstep --move", "--move");
+  // A platform of a fifth the size: what is refused says what is taken.
+  const std::string desk = app("accept") + "arm_on_desk --lockstep --quiet --coordinates alpha ";
+  const std::string told = sh(desk).text, most = "want a --step of at most ";
+  ASSERT_NE(told.find(most), std::string::npos) << told;
+  EXPECT_EQ(sh(desk + "--tests steps --step " + told.substr(told.find(most) + most.size(), 5) +
+               out("desk"))
+                .status,
+            0);
   expectRefusal(app("accept") + "z_sine --lockstep --coordinates w", "--coordinates");
   expectRefusal(app("accept") + "z_sine --lockstep --frequencies 2,1", "--frequencies");
   expectRefusal(app("accept") + "z_sine --lockstep --share nan", "--share");

@@ -210,6 +210,38 @@ TEST(Figure, ThinningKeepsThePeakOfALongLine) {
   EXPECT_LT(highest(drawn), highest(flat) - 50.0);
 }
 
+// Two a row, equally large, beside and above each other; every curve fills the same share of its
+// panel, whatever its numbers are.
+TEST(Figure, PanelsStandApartAndShowAllOfTheirCurves) {
+  std::vector<Panel> panels;
+  for (const auto& [low, high] :
+       {std::pair(0.0, 1.0), {-3.0, 5.0}, {1e3, 1e3 + 2.0}, {-7e-3, -1e-3}, {0.0, 40.0}})
+    panels.push_back({"time", "y", {{"", {1.0, 2.0, 5.0}, {low, high, low}, 0, false}}, false});
+  const std::string text = svg(panels);
+  std::vector<Eigen::AlignedBox2d> curves;
+  const std::regex point(R"([ML]?(\d+\.?\d*),(\d+\.?\d*))");
+  for (std::size_t at = 0; (at = text.find("class=\"c0\"", at)) != std::string::npos; ++at) {
+    const std::string path = text.substr(at, text.find("/>", at) - at);
+    Eigen::AlignedBox2d box;
+    for (std::sregex_iterator m(path.begin(), path.end(), point), end; m != end; ++m)
+      box.extend(Eigen::Vector2d(std::stod((*m)[1]), std::stod((*m)[2])));
+    if (!box.isEmpty()) curves.push_back(box);
+  }
+  ASSERT_EQ(curves.size(), panels.size());
+  for (std::size_t k = 0; k < curves.size(); ++k) {
+    EXPECT_NEAR(curves[k].sizes().x(), curves[0].sizes().x(), 1.0) << k;
+    EXPECT_NEAR(curves[k].sizes().y(), curves[0].sizes().y(), 1.0) << k;
+    EXPECT_NEAR(curves[k].min().x(), curves[k % 2].min().x(), 0.2) << k;
+    if (k >= 2) {
+      EXPECT_GT(curves[k].min().y(), curves[k - 2].max().y() + 40.0) << k;
+    }
+  }
+  EXPECT_GT(curves[1].min().x(), curves[0].max().x() + 40.0);
+  EXPECT_NEAR(curves[1].min().y(), curves[0].min().y(), 0.2);
+  EXPECT_GT(curves[0].sizes().x(), 300.0);  // of 960 and 250
+  EXPECT_GT(curves[0].sizes().y(), 120.0);
+}
+
 #ifndef VES_SANITIZE  // a quarter of a minute without, minutes with
 /// The tables of a page, by rows and cells.
 std::vector<std::vector<std::vector<std::string>>> tablesOf(const std::string& html) {

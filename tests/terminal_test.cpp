@@ -14,6 +14,9 @@
 namespace ves {
 namespace {
 
+/// Where a line may be typed; the status may be renewed at once.
+constexpr const char* kPrompt = R"(> (\x1b7|$))";
+
 /// A program on a pseudo-terminal, and what it has shown so far.
 class Terminal {
  public:
@@ -85,7 +88,7 @@ class OnATerminal : public test::Programs {
 TEST_F(OnATerminal, TheMenuShowsWhereThePlatformIsWhileAPersonTypes) {
   Terminal person(session("--out a"));
   person.until("`help`: what each does");
-  person.until("> $");
+  person.until(kPrompt);
   const std::string status = R"(\[(\w+) (\d+\.\d) s\] x ([+-]\d+\.\d) y [^\r\n\x1b]*)";
   const auto statusNow = [&](const std::string& phase) {
     const std::string line = person.until(R"(\[)" + phase + R"( \d+\.\d s\] x [^\r\n\x1b]* deg)");
@@ -123,7 +126,7 @@ TEST_F(OnATerminal, TheMenuShowsWhereThePlatformIsWhileAPersonTypes) {
   person.type("trajectory\n");
   person.until("seconds");
   person.type("back\n");
-  person.until("> $");
+  person.until(kPrompt);
   person.type("status\n");
   person.until("bias       none: not calibrated");
   person.type("calibration\n");
@@ -139,7 +142,7 @@ TEST_F(OnATerminal, TheMenuShowsWhereThePlatformIsWhileAPersonTypes) {
 
 TEST_F(OnATerminal, CtrlCBringsThePlatformHome) {
   Terminal person(session("--out a"));
-  person.until("> $");
+  person.until(kPrompt);
   person.type("arm\n");
   person.until("holding");
   person.type("move in 1 x 5\n");
@@ -153,7 +156,7 @@ TEST_F(OnATerminal, AStopIsNamedWithItsTick) {
   Terminal person(
       session("--out a --set 'program=[{calibration: {}}, {move: {duration_s: 30}, "
               "faults: [{at_s: 0.5, duration_s: 60, fault: wrench_rail, which: 3}]}]'"));
-  person.until("> $");
+  person.until(kPrompt);
   person.type("program\n");
   const std::string stopped = person.until("STOPPED in tick \\d+ by: [a-z ]+");
   person.type("\n");

@@ -155,11 +155,12 @@ AcceptanceTest acceptanceTest(const Experiment& scenario, int coordinate,
   if (options.steps) {
     std::string rows;
     const std::vector<double> path = stepPath(out.step, c.periodSeconds());
-    if (*std::max_element(path.begin(), path.end()) > options.share * way)
+    const double top = *std::max_element(path.begin(), path.end());
+    if (top > options.share * way)
       throw InputError(
           fmt::format("{}: {}: the step of acceleration needs more room than there is, "
-                      "want a smaller --step",
-                      scenario.name, key));
+                      "want a --step of at most {:.2g}",
+                      scenario.name, key, 0.9 * options.step * options.share * way / top));
     for (const double x : path) {
       rows += rows.empty() ? "[" : ", [";
       for (int i = 0; i < 6; ++i)
