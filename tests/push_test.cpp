@@ -206,6 +206,18 @@ TEST(Push, NothingRealIsPushed) {
   nowhere.on = static_cast<PushOrder::On>(3);
   EXPECT_TRUE(plausible(order));
   EXPECT_FALSE(plausible(nowhere));
+  for (const double bad : std::initializer_list<double>{NAN, -INFINITY, 1e3}) {
+    PushOrder far = order, hard = order, long_one = order;
+    far.point.y() = bad;
+    hard.force_I.z() = bad;
+    long_one.duration = bad;
+    EXPECT_FALSE(plausible(far)) << bad;
+    EXPECT_FALSE(plausible(hard)) << bad;
+    EXPECT_FALSE(plausible(long_one)) << bad;
+  }
+  PushOrder askew = order;  // each within, all of it too much
+  askew.force_I.setConstant(150.0);
+  EXPECT_FALSE(plausible(askew));
   const Experiment none = calm("free_decay");
   RobotOrders nobody(none);
   EXPECT_TRUE(nobody.take(order, {}));

@@ -281,6 +281,20 @@ TEST(Supervisor, ATripEndsATareAndAStopLastsUntilAResetWithoutACause) {
   EXPECT_EQ(desk.order(Request::kReset).refusal, Refusal::kNotStopped);
 }
 
+// Nor one that waits for a stream of samples and meets one: releasing a button moves nothing.
+TEST(Supervisor, ACauseEndsARequestThatWaits) {
+  for (const Request request : {Request::kArm, Request::kStart}) {
+    Desk desk(puma());
+    desk.tripped = only(Check::kStale);
+    desk.advance();
+    EXPECT_EQ(desk.order(request).refusal, Refusal::kNone);
+    desk.tripped = only(Check::kPanicButton);
+    desk.advance();
+    desk.tripped = {};
+    for (int i = 0; i < 5; ++i) EXPECT_EQ(desk.advance().phase, Phase::kDisarmed);
+  }
+}
+
 TEST(Supervisor, ARequestToArmDoesNotOutliveACause) {
   Desk desk(puma());
   desk.tripped = only(Check::kPanicButton);

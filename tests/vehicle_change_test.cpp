@@ -182,6 +182,28 @@ TEST(VehicleChange, PutsNoEnergyInAndMakesNoStep) {
       for (const bool with_robot : {false, true}) expectPassive(coupled, with_robot, seed);
 }
 
+// What nothing swings on changes at once, and owes nothing.
+TEST(VehicleChange, ThatIsFinishedTakesAndOwesNothing) {
+  const VehicleMatrices m = matrices(false);
+  AdmittanceModel model(modesOf(m.M, m.C, m.K), kTickSeconds);
+  model.reset(Vec6::Constant(0.05));
+  VehicleChange change(kTickSeconds, 10.0);
+  VehicleOrder order;
+  order.to.mass = 3.0;
+  order.to.stiffness = 2.0;
+  order.over = 5.0;
+  change.begin(order, model);
+  for (int k = 0; k < 20; ++k) change.advance(model);
+  change.finish(model);
+  EXPECT_EQ(change.energy(), 0.0);
+  EXPECT_EQ(change.damping(), 0.0);
+  EXPECT_EQ(model.factors(), (VehicleFactors{3.0, 1.0, 2.0}));
+  for (int k = 0; k < 20; ++k) {
+    change.advance(model);
+    EXPECT_EQ(change.damping(), 0.0);
+  }
+}
+
 TEST(VehicleChange, ArrivesInItsTimeWhereTheVehicleSwings) {
   const VehicleMatrices m = matrices(false);
   AdmittanceModel model(modesOf(m.M, m.C, m.K), kTickSeconds);

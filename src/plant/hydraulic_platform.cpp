@@ -33,7 +33,6 @@ HydraulicPlatform::HydraulicPlatform(const Geometry& geometry, const HydraulicMo
     : geometry_(geometry), model_(model), lines_(legLines(geometry, X_IP)) {
   P_.X = X_IP;
   carry(load);
-  load_work_ = 0.0;
   const Vec6 carried = weight(model_, X_IP.R) + rotate(X_IP.R, load.F_Po_P).stacked();
   const Vec6 f = holding(lines_, carried);
   for (int i = 0; i < kLegs; ++i) legs_.emplace_back(model_.leg, lines_.L(i), f(i));
