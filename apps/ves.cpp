@@ -142,18 +142,21 @@ void printUsage(FILE* to) {
              fmt::format("the manual page: {} man | man -l -", frontDoor()));
 }
 
+/// None where the word is none.
+const Command* commandOf(std::string_view word) {
+  const auto at = std::find_if(std::begin(kCommands), std::end(kCommands),
+                               [&](const Command& c) { return word == c.name; });
+  return at == std::end(kCommands) ? nullptr : at;
+}
+
 int dispatch(int argc, char** argv) {
   std::string_view word = argc > 1 ? argv[1] : "";
-  const auto named = [&](const Command& c) { return word == c.name; };
-  if (const auto c = std::find_if(std::begin(kCommands), std::end(kCommands), named);
-      c != std::end(kCommands))
-    return c->run(argc - 1, argv + 1);
+  if (const Command* command = commandOf(word)) return command->run(argc - 1, argv + 1);
   const bool help = word == "help" || word == "--help" || word == "-h";
   if (help && argc == 3) {
     word = argv[2];
-    if (const auto c = std::find_if(std::begin(kCommands), std::end(kCommands), named);
-        c != std::end(kCommands)) {
-      fmt::print("{}", printed(*c, "--help"));
+    if (const Command* command = commandOf(word)) {
+      fmt::print("{}", printed(*command, "--help"));
       return kDone;
     }
   } else if (argc > 2 && (help || word == "--version" || word == "completion" || word == "man")) {

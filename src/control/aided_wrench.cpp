@@ -305,16 +305,12 @@ void AidedWrench::endGroup(const Mat6& counts_per_wrench) noexcept {
 /// it shows less than half of what would be found, there is none any more.
 void AidedWrench::refineLasting() noexcept {
   const std::size_t n = std::min(groups_, Lesson::kGroups);
-  const Sum &now = sums_[groups_ % sums_.size()], &then = sums_[(groups_ - n) % sums_.size()];
-  const auto groups = static_cast<double>(n);
-  const MassColumns columns = (now.columns - then.columns) / groups;
-  const Vec6 mean = belief_.unexplained(columns, (now.y - then.y) / groups);
+  const Window last = window(n, belief_);
   if (groups_ <= Lesson::kGroups) {
-    const double found = lasting_.samples, since = groups * Lesson::kGroup;
-    lasting_.mean = (found * lasting_.found + since * mean) / (found + since);
+    const double found = lasting_.samples, since = last.samples;
+    lasting_.mean = (found * lasting_.found + since * last.mean) / (found + since);
   }
-  if (n == Lesson::kGroups &&
-      !gate_.exceeds(ResidualGate::kMeans.back(), 2.0 * mean, noise_, belief_.variance(columns)))
+  if (n == Lesson::kGroups && !gate_.exceeds(last.samples, 2.0 * last.mean, noise_, last.unknown))
     restart();
 }
 
@@ -356,11 +352,13 @@ bool AidedWrench::isForce(std::size_t mean, const MassBelief& before) noexcept {
   double farthest = excess(best);
   for (std::size_t block = (groups_ - 1) / kGroupsOfBlock + 1; block-- > 0;) {
     const std::size_t groups = groups_ - block * kGroupsOfBlock;
+    if (groups <= n) continue;
     if (groups > Lesson::kGroups) break;
     const MassBelief& then = beliefs_[block % kBlocks];
     const Window longer = window(groups, then);
-    if (groups <= n || !(excess(longer) > farthest)) continue;
-    farthest = excess(longer);
+    const double beyond = excess(longer);
+    if (!(beyond > farthest)) continue;
+    farthest = beyond;
     best = longer;
     known = &then;
   }
