@@ -1062,7 +1062,7 @@ TEST(ServoIdentification, FindsWhatTheMachineIs) {
     const Experiment e = experiment("servo_identification", {set});
     const ServoModel& nominal = e.controller.servo;
     const ServoEstimate found = identifyServo(nominal, 0.01, Recorded(e).legs);
-    const auto near = [&](Vec6 ServoModel::*value, double factor) {
+    const auto near = [&, set = set](Vec6 ServoModel::*value, double factor) {
       for (int i = 0; i < kLegs; ++i) {
         const double error = (found.servo.*value)(i)-factor * (nominal.*value)(i);
         EXPECT_LT(std::abs(error), 3.5 * (found.deviation.*value)(i)) << set;

@@ -116,7 +116,7 @@ TEST(AdmittanceModel, KeepsItsBooksUnderDamping) {
     base.damping = own;
     AdmittanceModel model(base, 0.01);
     double taken = 0.0, damped = 0.0, dissipated = 0.0;
-    const auto energy = [&] {
+    const auto energy = [&, with_robot = with_robot] {
       const Vec6 x_dot = with_robot ? Vec6(model.motion().x_dot) : Vec6(Vec6::Zero());
       return model.energy() + 0.5 * x_dot.dot(M_1 * x_dot);
     };

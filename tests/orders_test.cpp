@@ -486,8 +486,8 @@ TEST(Program, ASegmentGoesOnFromWhereTheOneBeforeItWas) {
       "{admittance: {duration_s: 0.5}}",
       "{monitor: {duration_s: 1, interval_s: 1}}",
       "{calibration: {}}",
-      "{path: {rows_m_deg: [[0, 0, 0, 0, 0, 0], [0, 0, 0.0002, 0, 0, 0], [0, 0, 0.0008, 0, 0, 0], "
-      "[0, 0, 0.0018, 0, 0, 0]]}}"};
+      ("{path: {rows_m_deg: [[0, 0, 0, 0, 0, 0], [0, 0, 0.0002, 0, 0, 0], [0, 0, 0.0008, 0, 0, 0], "
+       "[0, 0, 0.0018, 0, 0, 0]]}}")};
   for (const char* one : kinds)
     for (const char* two : kinds) {
       const std::string first = one;  // a recorded path begins where it says, and there is one

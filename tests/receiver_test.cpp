@@ -100,8 +100,9 @@ TEST_F(ReceiverOnABus, HearsWhatLcmSaysWholeAndInParts) {
   receiver_.hear("OTHER");
   std::mt19937 random(1);
   // Around what one datagram holds (65499 with the name), what two parts do, and many.
-  for (const std::size_t size :
-       {0, 1, 4, 1400, 65490, 65491, 65492, 130'965, 130'966, 130'967, 1'000'000}) {
+  constexpr std::size_t kSizes[] = {0,     1,       4,       1400,    65490,    65491,
+                                    65492, 130'965, 130'966, 130'967, 1'000'000};
+  for (const std::size_t size : kSizes) {
     std::string data(size, ' ');
     for (char& c : data) c = static_cast<char>(random());
     for (const std::string channel : {"CHANNEL", "OTHER", "NOBODYS", "CHANNEL2", "CHANNE"})

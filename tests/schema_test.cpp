@@ -31,9 +31,10 @@ Numbers numbersOf(const S& s) {
   Numbers out;
   schema::forEach(s, [&](const auto& field) {
     const auto add = [&](const auto& values) {
-      for (int i = 0; i < static_cast<int>(std::size(values)); ++i)
-        out.emplace_back(field.name + ("[" + std::to_string(i) + "]"),
-                         static_cast<double>(values[static_cast<std::size_t>(i)]));
+      int i = 0;
+      for (const auto& value : values)
+        out.emplace_back(field.name + ("[" + std::to_string(i++) + "]"),
+                         static_cast<double>(value));
     };
     using V = std::remove_cvref_t<decltype(field.value)>;
     if constexpr (std::same_as<V, Wrench> || std::same_as<V, Pose>)

@@ -78,7 +78,7 @@ TEST_P(SecondTime, OfAControllerThatTrippedIsAsANewOnesFirst) {
   emulate();
   machine_.order(Request::kTare);
   machine_.rest(20);
-  machine_.open(kAllSwitchesClosed & ~1);
+  machine_.open(kAllSwitchesClosed & ~1u);
   machine_.tick();
   machine_.until(Phase::kStopped);
   machine_.open(kAllSwitchesClosed);

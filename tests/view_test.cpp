@@ -283,7 +283,7 @@ TEST(Scene, WheelsHaveTakenWhatTheyGave) {
   const Scene scene(run.series.experiment);
   const auto d = scene.description();
   ASSERT_EQ(d["wheels"].size(), 2u);
-  EXPECT_EQ(d["wheels"][0]["axis"], (nlohmann::json{0.0, 0.0, 1.0}));
+  EXPECT_EQ(d["wheels"][0]["axis"], (nlohmann::ordered_json{0.0, 0.0, 1.0}));
   EXPECT_NEAR(d["wheels"][0]["most"].get<double>(), 0.4, 1e-12);
   const std::vector<Column> all = columns(run.series.experiment);
   const auto column = [&](const std::string& name) {

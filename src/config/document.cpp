@@ -402,7 +402,7 @@ void applyOverride(Value& document, const std::string& assignment, std::string_v
 
 std::string fingerprint(const std::string& text) {
   std::uint64_t hash = 0xcbf29ce484222325u;
-  for (const unsigned char c : text) hash = (hash ^ c) * 0x100000001b3u;
+  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3u;
   return fmt::format("{:016x}", hash);
 }
 

@@ -32,8 +32,6 @@ std::string inShort(const Value& value) {
 /// keys.
 class Meanings {
  public:
-  explicit Meanings(const Value& standard) : standard_(standard) {}
-
   KeyMeaning of(const Value* said, const AskedKey& asked, const std::string& path,
                 const Value* standard) const {
     KeyMeaning out;
@@ -89,8 +87,6 @@ class Meanings {
       if (!said.find(name)) out.join(below);
     return out;
   }
-
-  const Value& standard_;
 };
 
 Value readSentences(const std::filesystem::path& file) {
@@ -255,7 +251,7 @@ KeyMeaning keyMeanings(const std::filesystem::path& config) {
   const Value standard = loadDocument(config / "ves.yaml");
   const Value* const said = file.find("keys");
   if (!said) root.fail("keys", "missing");
-  return Meanings(standard).of(said, asked, "", &standard);
+  return Meanings().of(said, asked, "", &standard);
 }
 
 void walkKeys(const KeyMeaning& root, const std::function<void(const KeyMeaning&)>& visit) {

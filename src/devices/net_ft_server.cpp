@@ -97,11 +97,11 @@ void NetFtServer::takeRequests() {
 
 /// One page, to whoever asks; nobody is waited for.
 void NetFtServer::answerPage() {
-  constexpr int kPatience = 20;  // [ms] for a request that has not come whole
+  constexpr int kWhole = 20;  // [ms] for a request that has not come whole
   for (int fd; (fd = accept4(pages_, nullptr, nullptr, SOCK_CLOEXEC)) >= 0; close(fd)) {
     pollfd p{fd, POLLIN, 0};
     char request[2048];
-    if (poll(&p, 1, kPatience) <= 0) continue;
+    if (poll(&p, 1, kWhole) <= 0) continue;
     const ssize_t got = recv(fd, request, sizeof request, MSG_DONTWAIT);
     if (got <= 0) continue;
     const std::string_view asked(request, static_cast<std::size_t>(got));

@@ -153,8 +153,7 @@ class WebServer::Impl {
     lws_context_creation_info info{};
     info.port = CONTEXT_PORT_NO_LISTEN_SERVER;
     info.protocols = protocols_.data();
-    info.gid = static_cast<gid_t>(-1);
-    info.uid = static_cast<uid_t>(-1);
+    info.gid = info.uid = -1;  // as it is
     info.timeout_secs = 10;
     info.fd_limit_per_thread = kMostConnections + 32;  // ours, the bus, what lws needs
     info.user = this;

@@ -52,7 +52,7 @@ struct Message {
   const char* about;
 };
 template <typename T>
-inline constexpr Message kMessage;
+inline constexpr Message kMessage{};
 
 template <typename S, typename T>
 concept Of = std::same_as<std::remove_const_t<S>, T>;
