@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // ves accept: what a motion platform does, coordinate by coordinate.
+#include <fmt/format.h>
+
 #include "commands.hpp"
+#include "outputs.hpp"
+#include "print.hpp"
 #include "runner.hpp"
 #include "ves/acceptance/acceptance.hpp"
 #include "ves/config/calibration.hpp"

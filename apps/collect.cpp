@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // ves collect: the data collection routine, on a recorded run.
+#include <fmt/format.h>
 #include <cmath>
 #include <fstream>
 #include <iostream>
 
-#include "app.hpp"
 #include "commands.hpp"
+#include "logs.hpp"
+#include "options.hpp"
+#include "outputs.hpp"
 #include "ves/bus/channels.hpp"
 #include "ves/bus/ordered_log.hpp"
 #include "ves/core/build.hpp"

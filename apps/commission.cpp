@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // ves commission: from a machine that nobody has told about to one belief file.
+#include <fmt/format.h>
+
 #include "commands.hpp"
+#include "print.hpp"
 #include "runner.hpp"
 #include "ves/core/build.hpp"
 #include "ves/validation/commissioning.hpp"

@@ -3,8 +3,11 @@
 // ves compare: what runs differ in, as a table and as pictures.
 #include <fmt/ranges.h>
 
-#include "app.hpp"
 #include "commands.hpp"
+#include "logs.hpp"
+#include "options.hpp"
+#include "outputs.hpp"
+#include "print.hpp"
 #include "ves/core/coordinates.hpp"
 #include "ves/evaluation/differences.hpp"
 #include "ves/validation/page.hpp"

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // ves conform: does a machine on the bus keep its side of it?
-#include "ves/doctor/conform.hpp"
-#include "app.hpp"
+#include <fmt/format.h>
+
 #include "commands.hpp"
+#include "options.hpp"
+#include "print.hpp"
 #include "ves/bus/channels.hpp"
 #include "ves/core/build.hpp"
+#include "ves/doctor/conform.hpp"
 #include "ves/realtime/realtime.hpp"
 #include "ves/run/announcer.hpp"
 

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // ves controller: testPlatform, with its menu or as a process that takes its orders from the bus.
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include "commands.hpp"
+#include "print.hpp"
 #include "runner.hpp"
 #include "ves/console/console.hpp"
 
@@ -104,19 +106,27 @@ int controllerCommand(int argc, char** argv) {
   cli.add_flag("!--no-plots", options.plots, "leave the plots out");
   return run(cli, argc, argv, [&] {
     const bool alone = options.no_menu || options.process.start || options.process.lockstep;
-    const auto want = [&](const char* option, const char* instead) {
-      if (alone)
-        refuse(cli, {option}, fmt::format("with --no-menu, --start or --lockstep; {}", instead));
-    };
-    want("--do", "want orders over the bus");
-    want("--out", "want --log FILE, or ves run");
-    want("--plant", "want ves plant beside it, or ves run");
-    want("--no-plots", "it draws none");
-    if (options.process.lockstep)
-      refuse(cli, {"--realtime"}, "beside --lockstep, which waits on no clock");
     // Lines of the menu may come through a pipe; without a word of them it is the process alone.
     const bool session = options.plant || !options.out.empty() || !options.commands.empty();
-    return alone || (!session && !isatty(STDIN_FILENO)) ? serve(options) : console(options);
+    const bool menu = !alone && (session || isatty(STDIN_FILENO));
+    const auto want = [&](const char* option, const char* instead) {
+      const char* where = menu    ? "with the menu"
+                          : alone ? "with --no-menu, --start or --lockstep"
+                                  : "without a terminal, --do or --plant";
+      refuse(cli, {option}, fmt::format("{}; {}", where, instead));
+    };
+    if (menu) {
+      want("--log", "want --out FOLDER, where run.lcmlog will be");
+      want("--flight", "run.lcmlog has all of it");
+    } else {
+      want("--do", "want orders over the bus");
+      want("--out", "want --log FILE, or ves run");
+      want("--plant", "want ves plant beside it, or ves run");
+      want("--no-plots", "it draws none");
+    }
+    if (options.process.lockstep)
+      refuse(cli, {"--realtime"}, "beside --lockstep, which waits on no clock");
+    return menu ? console(options) : serve(options);
   });
 }
 

@@ -2,6 +2,7 @@
 //
 // ves doctor: can this machine keep the loop's time?
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include "commands.hpp"

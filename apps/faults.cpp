@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // ves faults: injects every fault of the table and says what happened.
-#include "app.hpp"
+#include <fmt/format.h>
+
 #include "commands.hpp"
+#include "options.hpp"
+#include "ves/core/spelling.hpp"
 #include "ves/faults/soak.hpp"
 #include "ves/faults/table.hpp"
 

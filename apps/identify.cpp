@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // ves identify: what the machine can find out about itself.
+#include <fmt/format.h>
+
 #include "commands.hpp"
+#include "logs.hpp"
+#include "outputs.hpp"
+#include "print.hpp"
 #include "runner.hpp"
 #include "ves/evaluation/identified.hpp"
 #include "ves/identification/scenario.hpp"

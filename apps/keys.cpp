@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // ves keys: what scenario files may say.
+#include <fmt/format.h>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "app.hpp"
 #include "commands.hpp"
+#include "options.hpp"
 #include "ves/config/keys.hpp"
 
 namespace ves::app {

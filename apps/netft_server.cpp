@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // ves netft-server: the simulated force sensor as an ATI Net F/T.
+#include <fmt/format.h>
 #include <time.h>
 
-#include "app.hpp"
 #include "commands.hpp"
+#include "logs.hpp"
+#include "options.hpp"
 #include "ves/bus/channels.hpp"
 #include "ves/bus/event_log.hpp"
 #include "ves/devices/net_ft_server.hpp"

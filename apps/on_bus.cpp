@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // ves on-bus: any program on a private bus.
+#include <fmt/format.h>
 #include <unistd.h>
+#include <cerrno>
+#include <cstring>
 
 #include "app.hpp"
 #include "commands.hpp"
+#include "ves/bus/bus.hpp"
+#include "ves/core/errors.hpp"
 
 namespace ves::app {
 

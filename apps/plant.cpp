@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // ves plant: everything that was metal, as a process of its own.
-#include "app.hpp"
 #include "commands.hpp"
+#include "options.hpp"
+#include "print.hpp"
 
 namespace ves::app {
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // ves platform: joints, legs and limits of a Stewart platform.
+#include <fmt/format.h>
+
 #include "ves/config/platform.hpp"
 
 #include "app.hpp"

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // ves plot: columns of a recorded run as a picture.
+#include <fmt/format.h>
 #include <cmath>
 
-#include "app.hpp"
 #include "commands.hpp"
+#include "logs.hpp"
+#include "options.hpp"
+#include "outputs.hpp"
 #include "ves/pictures/figure.hpp"
 #include "ves/series/series.hpp"
 

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // ves replay: a recorded run through the controller once more.
-#include "ves/run/replay.hpp"
-#include "app.hpp"
+#include <fmt/format.h>
+
 #include "commands.hpp"
+#include "logs.hpp"
+#include "options.hpp"
 #include "ves/core/build.hpp"
+#include "ves/run/replay.hpp"
 
 namespace ves::app {
 

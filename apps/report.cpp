@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // ves report: chapter 4 of the report once more, as a page and as numbers.
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include "commands.hpp"

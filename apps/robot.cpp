@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // ves robot: what a robot description holds, and what of it moves.
+#include <fmt/format.h>
+
 #include "app.hpp"
 #include "commands.hpp"
 #include "ves/config/urdf.hpp"

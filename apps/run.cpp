@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // ves run: one scenario, from start to its folder of results.
+#include <fmt/format.h>
+
 #include "commands.hpp"
 #include "runner.hpp"
 

@@ -3,12 +3,16 @@
 // What `run`, `demo` and `controller` share: an experiment from start to its folder of results.
 #pragma once
 
+#include <fcntl.h>
 #include <fmt/chrono.h>
 #include <poll.h>
+#include <unistd.h>
 
 #include <fstream>
 
-#include "app.hpp"
+#include "options.hpp"
+#include "outputs.hpp"
+#include "print.hpp"
 #include "ves/page/web_server.hpp"
 #include "ves/realtime/realtime.hpp"
 #include "ves/results/results.hpp"

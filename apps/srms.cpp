@@ -5,8 +5,10 @@
 
 #include <fstream>
 
-#include "app.hpp"
 #include "commands.hpp"
+#include "options.hpp"
+#include "outputs.hpp"
+#include "print.hpp"
 #include "ves/config/base.hpp"
 #include "ves/core/coordinates.hpp"
 

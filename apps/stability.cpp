@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // ves stability: Appendix E as published, and the loop of this machine.
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include "commands.hpp"
+#include "outputs.hpp"
+#include "print.hpp"
 #include "runner.hpp"
 #include "ves/analysis/appendix_e.hpp"
 #include "ves/analysis/gate.hpp"

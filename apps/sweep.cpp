@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // ves sweep: one scenario over many values.
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include "commands.hpp"
 #include "runner.hpp"
 #include "ves/config/keys.hpp"
+#include "ves/core/build.hpp"
 #include "ves/export/parquet.hpp"
+#include "ves/series/series.hpp"
 #include "ves/sweep/sweep.hpp"
 
 namespace ves::app {

@@ -1,13 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // ves: every command of the project in one program.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <csignal>
+#include <iostream>
+#include <sstream>
 #include <string_view>
 
-#include <csignal>
 #include "app.hpp"
-
 #include "commands.hpp"
 #include "ves/core/build.hpp"
+#include "ves/core/spelling.hpp"
 
 namespace ves::app {
 namespace {

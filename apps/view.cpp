@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // ves view: a run in a browser, as it happens or from its log; or a log as one file.
-#include "app.hpp"
+#include <fmt/format.h>
+
 #include "commands.hpp"
+#include "logs.hpp"
+#include "options.hpp"
+#include "outputs.hpp"
 #include "ves/page/film.hpp"
 #include "ves/page/live_run.hpp"
 #include "ves/page/page.hpp"
