@@ -6,81 +6,12 @@
 #include <utility>
 
 #include "ves/math/dense.hpp"
-#include "ves/robot/momentum.hpp"
 
 namespace ves {
 
-double largestFelt(const ServoModel& servo, double period, std::size_t samples) {
-  // The mean of what steps make, later by a period each, is what their mean makes; a mean over the
-  // sensor's window is the filtered speed less that of a window before, so less what later steps
-  // make.
-  constexpr int kParts = 40;  // [-] of a period
-  const double w = servo.sensor_cutoff, dt = period / kParts;
-  const int n = static_cast<int>(samples),
-            window = static_cast<int>(std::lround(servo.sensor_window / dt));
-  const auto steps = [&](int k) {  // [-] mean of those begun
-    return k < 0 ? 0.0 : static_cast<double>(std::min(n, k / kParts + 1)) / n;
-  };
-  double largest = 0.0;
-  for (const double tau : {servo.tau.minCoeff(), servo.tau.maxCoeff()}) {
-    const double decay = std::exp(-dt / tau), settled = 20.0 * (tau + 1.0 / w);  // [-], [s]
-    Butterworth2<1> filter(w);
-    const Butterworth2<1>::Step step = filter.prepare(dt);
-    double v = 0.0;
-    for (int k = 0; k < n * kParts + window + settled / dt; ++k) {
-      const double v_end = steps(k) - (window > 0 ? steps(k - window) : 0.0), before = v;
-      v = v_end + (v - v_end) * decay;
-      const Butterworth2<1>::Channels acceleration((v - before) / dt);
-      filter.jump(acceleration);
-      filter.advance(step, acceleration);
-      const double a = filter.output()(0), a_rate = filter.rate()(0);
-      const double filtered_v = v - (a_rate + M_SQRT2 * w * a) / (w * w);
-      largest = std::max(largest, window > 0 ? filtered_v / servo.sensor_window : a);
-    }
-  }
-  return largest;
-}
-
-ResidualGate::ResidualGate(const ControllerConfig& config) : deviations_(config.compensation.gate) {
-  if (!config.compensation.aided) return;
-  for (std::size_t i = 0; i < kMeans.size(); ++i)
-    felt_[i] =
-        largestFelt(config.servo, config.periodSeconds(), static_cast<std::size_t>(kMeans[i]));
-}
-
 namespace {
 
-/// [count^2] of sensor, attitude and joints in the mean of n samples.
-Vec6 variance(int n, const ResidualNoise& noise) {
-  // Where no noise dithers them, what a count leaves out stays the same from sample to sample.
-  const auto undithered = (-4.0 * M_PI * M_PI * noise.sensor.variance.array()).exp() / 12.0;
-  return noise.sensor.ofMean(n) + undithered.matrix() + noise.weight +
-         (noise.joints / n).cwiseAbs2();
-}
-
-}  // namespace
-
-Vec6 ResidualGate::most(int samples, const ResidualNoise& noise,
-                        const Vec6& unknown) const noexcept {
-  std::size_t i = kMeans.size() - 1;
-  while (samples < kMeans[i]) --i;  // a leg is felt less in a longer mean
-  return deviations_ * (variance(samples, noise) + unknown).cwiseSqrt() + felt_[i] * noise.legs;
-}
-
-bool ResidualGate::exceeds(int samples, const Vec6& mean, const ResidualNoise& noise,
-                           const Vec6& unknown) const noexcept {
-  return !(mean.cwiseAbs().array() <= most(samples, noise, unknown).array()).all();
-}
-
-double ResidualGate::excess(int samples, const Vec6& mean, const ResidualNoise& noise,
-                            const Vec6& unknown) const noexcept {
-  return mean.cwiseAbs().cwiseQuotient(most(samples, noise, unknown)).maxCoeff();
-}
-
-namespace {
-
-constexpr double kMostDeviations = 6.0;  // [-] that a parameter may be off
-constexpr double kDoubt = 0.5;           // [s] before and after the gripper is told to have moved
+constexpr double kDoubt = 0.5;  // [s] before and after the gripper is told to have moved
 
 }  // namespace
 
@@ -89,31 +20,25 @@ AidedWrench::AidedWrench(const ControllerConfig& config)
       hold_(std::max(1, static_cast<int>(
                             std::lround(config.compensation.gate_hold / config.periodSeconds())))),
       gravity_(config.gravity),
-      geometry_(config.geometry),
-      period_(config.periodSeconds()),
-      rounding_(config.servo.readings.scale.maxCoeff() / std::sqrt(12.0)),
-      servo_(config.servo),
-      joint_speed_(JointParabola(config).speed * config.joints.deviation),
-      X_SP_(inverse(config.sensor.X_PS)),
-      S_proc_(inverse(config.sensor.C_proc)),
-      C_proc_(config.sensor.C_proc),
+      counts_(config.sensor),
       X_PL0_(config.payload.X_PL0()),
       regressor_(config.compensation.learns_masses
                      ? MassRegressor(config.payload.robot, config.hand)
                      : MassRegressor(RobotModel())),
       common_(config.compensation.mass_error / std::sqrt(3.0)),
       prior_(regressor_.deviations(common_)),
-      most_(kMostDeviations * prior_),
+      most_(regressor_.deviations(config.compensation.mostLearnt())),
       bias_deviation_(config.stillness.bias),
-      least_correlation_(filteredCorrelation(config.servo, config.periodSeconds())),
       gate_(config),
+      noise_(config),
       twist_(config.servo.sensor_cutoff),
       doubted_(static_cast<int>(std::lround(kDoubt / config.periodSeconds()))),
       used_(MassVector::Zero(prior_.size())) {
   const double mass = config.compensation.hand_mass;
   hand_.setConstant(mass * config.compensation.hand_center);
   hand_(0) = mass;
-  if (regressor_.hand() >= 0) most_.segment<4>(regressor_.hand()) = kMostDeviations * hand_;
+  if (regressor_.hand() >= 0)
+    most_.segment<4>(regressor_.hand()) = Compensation::kMostInHand * hand_;
 }
 
 Wrench AidedWrench::update(const Input& in, bool engaged) noexcept {
@@ -130,7 +55,7 @@ Wrench AidedWrench::update(const Input& in, bool engaged) noexcept {
   hand_moved_ = hand_moved_ || in.gripper;  // also where nothing is learnt yet
   if (!engaged) {
     restart();
-    leg_speed_.setZero();
+    noise_.stop();
     settled_ = false;
     open_ = 0;
     residuals_ = 0;
@@ -142,13 +67,13 @@ Wrench AidedWrench::update(const Input& in, bool engaged) noexcept {
   calibrate(in);
   if (!begun_) return in.measured;
   if (std::exchange(hand_moved_, false) && regressor_.hand() >= 0)
-    doubtHand(countsPerWrench(in.X_IP.R));
+    doubtHand(counts_.perWrench(in.X_IP.R));
   if (in.samples.fresh()) {
     constexpr std::int64_t kRefresh = 100;  // [-] samples: attitude and joints change slowly
     if (residuals_++ % kRefresh == 0) refreshNoise(in);
-    refreshLegs(in.robot.platform());
+    noise_.refreshLegs(in.robot.platform());
     const Wrench residual = in.measured - in.joints.shown(in.robot.platform().w);
-    take(in, countsPerWrench(in.X_IP.R), residual);
+    take(in, counts_.perWrench(in.X_IP.R), residual);
   }
   const Wrench beyond = Wrench::from(in.share * (in.measured - reaction_).stacked());
   Wrench passed = beyond;
@@ -191,9 +116,9 @@ void AidedWrench::calibrate(const Input& in) noexcept {
   MassColumns momentum, weight;
   regressor_.evaluate(X_PL0_, gravity_, {in.X_IP.R, {}, {}, in.joints.q(), {}}, momentum, weight);
   MassColumns columns;
-  columns.noalias() = countsPerWrench(in.X_IP.R) * weight;
+  columns.noalias() = counts_.perWrench(in.X_IP.R) * weight;
   refreshNoise(in);
-  belief_.learnAtRest(columns, columns * used_, variance(kCalibrationSamples, noise_));
+  belief_.learnAtRest(columns, columns * used_, noise_.now().ofMean(kCalibrationSamples));
   restart();
 }
 
@@ -204,7 +129,7 @@ void AidedWrench::restart() noexcept {
   sums_[0].columns.setZero(6, prior_.size());
   sums_[0].y.setZero();
   sums_[0].time = 0.0;
-  belief_.beginBlocks(momentumNoise());
+  belief_.beginBlocks(noise_.ofMomentum());
   beliefs_[0] = belief_;
 }
 
@@ -235,7 +160,7 @@ void AidedWrench::take(const Input& in, const Mat6& counts_per_wrench,
   const Vec6 y = counts_per_wrench * residual.stacked() + in.bias.learnt(),
              beyond = weight_ * (belief_.parameters() - used_),
              left = y - belief_.bias() - counts_per_wrench * beyond - lasting_.mean;
-  if (gate_.exceeds(1, left, noise_, unknown_)) {
+  if (gate_.exceeds(1, left, noise_.now(), unknown_)) {
     open(belief_, std::max(0, in_group_) + 1);
     return;
   }
@@ -294,8 +219,8 @@ void AidedWrench::endGroup(const Mat6& counts_per_wrench) noexcept {
   const double block_time = sum.time - before.time;
   constexpr double kShare = 1.0 / static_cast<double>(kGroupsOfBlock);
   belief_.learn(kShare * (sum.columns - before.columns), kShare * (sum.y - before.y),
-                variance(static_cast<int>(kGroupsOfBlock) * Lesson::kGroup, noise_),
-                momentumNoise(), block_time);
+                noise_.now().ofMean(static_cast<int>(kGroupsOfBlock) * Lesson::kGroup),
+                noise_.ofMomentum(), block_time);
   if (doubts_ > 0) belief_.doubt(regressor_.hand(), hand_);
   beliefs_[(block + 1) % kBlocks] = belief_;
   use();
@@ -310,7 +235,8 @@ void AidedWrench::refineLasting() noexcept {
     const double found = lasting_.samples, since = last.samples;
     lasting_.mean = (found * lasting_.found + since * last.mean) / (found + since);
   }
-  if (n == Lesson::kGroups && !gate_.exceeds(last.samples, 2.0 * last.mean, noise_, last.unknown))
+  if (n == Lesson::kGroups &&
+      !gate_.exceeds(last.samples, 2.0 * last.mean, noise_.now(), last.unknown))
     restart();
 }
 
@@ -345,9 +271,9 @@ bool AidedWrench::isForce(std::size_t mean, const MassBelief& before) noexcept {
   const auto n = static_cast<std::size_t>(samples / Lesson::kGroup);
   Window best = window(n, before);
   const auto excess = [&](const Window& w) {
-    return gate_.excess(w.samples, w.mean - lasting_.mean, noise_, w.unknown);
+    return gate_.excess(w.samples, w.mean - lasting_.mean, noise_.now(), w.unknown);
   };
-  if (!gate_.exceeds(samples, best.mean - lasting_.mean, noise_, best.unknown)) return false;
+  if (!gate_.exceeds(samples, best.mean - lasting_.mean, noise_.now(), best.unknown)) return false;
   const MassBelief* known = &before;
   double farthest = excess(best);
   for (std::size_t block = (groups_ - 1) / kGroupsOfBlock + 1; block-- > 0;) {
@@ -362,7 +288,7 @@ bool AidedWrench::isForce(std::size_t mean, const MassBelief& before) noexcept {
     best = longer;
     known = &then;
   }
-  const bool lasts = gate_.exceeds(best.samples, best.mean, noise_, best.unknown);
+  const bool lasts = gate_.exceeds(best.samples, best.mean, noise_.now(), best.unknown);
   // The sample before the first group, too, where it began with that: it was withheld.
   const bool all = best.samples == static_cast<int>(groups_) * Lesson::kGroup;
   open(*known, best.samples + (all ? 1 : 0));
@@ -386,89 +312,21 @@ void AidedWrench::open(const MassBelief& before, int samples) noexcept {
 /// The model has what is believed now, within reason.
 void AidedWrench::use() noexcept {
   if (prior_.size() == 0) return;
-  constexpr double kLeast = 0.1;  // [-] of a body's mass
   MassVector next = belief_.parameters().cwiseMin(most_).cwiseMax(-most_);
   for (Eigen::Index i = 0; i < next.size(); i += 4)
-    next(i) = std::max(next(i), i == regressor_.hand() ? 0.0 : kLeast - 1.0);
+    next(i) = std::max(next(i), i == regressor_.hand() ? 0.0 : Compensation::kLeastLearnt - 1.0);
   if (next == used_) return;
   lesson_.learnt = next - used_;
   used_ = next;
   taught_ = true;
 }
 
-/// Variance of what the momentum, by the modelled legs and the joints' readings, is off by at an
-/// instant. A leg that is early or late by an update of its LegSlave is off by K count for that
-/// long.
-Vec6 AidedWrench::momentumNoise() const noexcept {
-  constexpr double kShare = 0.05;  // [-] rms, of a leg that is off by K count for good: measured
-  return (kShare * noise_.legs).cwiseAbs2() + (M_SQRT1_2 * period_ * noise_.joints).cwiseAbs2();
-}
-
 Wrench AidedWrench::lasting(const Mat3& R_IP) const noexcept {
-  return rotate(R_IP, transfer(inverse(X_SP_), Wrench::from(C_proc_ * lasting_.mean)));
+  return rotate(R_IP, counts_.wrench(lasting_.mean));
 }
 
-/// What the sensor reads of a wrench.
-Mat6 AidedWrench::countsPerWrench(const Mat3& R_IP) const noexcept {
-  Mat6 out;
-  for (int i = 0; i < 6; ++i)
-    out.col(i) =
-        S_proc_ * transfer(X_SP_, rotate(R_IP.transpose(), Wrench::from(Vec6::Unit(i)))).stacked();
-  return out;
-}
-
-/// What a sample's difference of the joints' momentum is off by.
-Vec6 AidedWrench::jointNoise(const Input& in) const noexcept {
-  Vec6 squared = Vec6::Zero();
-  if (joint_speed_.isZero(0.0)) return squared;
-  const Mat6 counts = countsPerWrench(in.X_IP.R);
-  for (int i = 0; i < in.carried.joints; ++i) {
-    const Wrench one = Wrench::from(
-        jointMomentum(in.carried, in.joints.q(), joint_speed_(i) * JointVector::Unit(i)));
-    squared += (counts * rotate(in.X_IP.R, transfer(X_PL0_, one)).stacked()).cwiseAbs2();
-  }
-  return M_SQRT2 / period_ * squared.cwiseSqrt();
-}
-
-/// A leg whose length is taken wrongly turns the weight; one whose acceleration is, the inertia.
 void AidedWrench::refreshNoise(const Input& in) noexcept {
-  noise_.sensor = in.bias.noise();
-  noise_.sensor.correlation = std::max(noise_.sensor.correlation, least_correlation_);
-  noise_.weight.setZero();
-  felt_of_legs_.setZero();
-  noise_.joints = jointNoise(in);
-  const Mat6& M_1 = in.robot.M_1();
-  const double mass = M_1(0, 0);
-  if (!(mass > 0.0)) return;
-  const Vec3 p_PoBcm_I = Vec3(M_1(5, 1), M_1(3, 2), M_1(4, 0)) / mass;
-  const Mat6 counts = countsPerWrench(in.X_IP.R);
-  LegMotion one;
-  const LegLines lines = legLines(geometry_, in.X_IP);
-  one.L = lines.L;
-  rates_of_twist_ = lines.J;
-  for (int i = 0; i < kLegs; ++i) {
-    BodyMotion P;
-    one.L_ddot = Vec6::Unit(i);
-    if (!forwardMotion(geometry_, in.X_IP, one, P)) return;
-    const Vec6 inertial = M_1 * (Vec6() << P.a, P.alpha).finished();
-    const Vec3 turned = P.alpha.cross(in.weight.f);
-    const auto squared = [&](double size, const Wrench& wrench) -> Vec6 {
-      return (size * counts * wrench.stacked()).cwiseAbs2();
-    };
-    noise_.weight += squared(rounding_, {turned, p_PoBcm_I.cross(turned)});
-    felt_of_legs_.col(i) = counts * inertial;
-  }
-}
-
-/// A leg that moves takes what it is told sooner or later by up to an update of its LegSlave, and
-/// has gone so much farther.
-void AidedWrench::refreshLegs(const BodyMotion& P) noexcept {
-  constexpr double kKept = 1.0 - 1.0 / ResidualGate::kMeans.back();  // [-] of the speed of before
-  const Vec6 twist = (Vec6() << P.v, P.w).finished();
-  leg_speed_ = (rates_of_twist_ * twist).cwiseAbs().cwiseMax(kKept * leg_speed_);
-  const Vec6 off =
-      steepest(servo_).cwiseProduct(servo_.readings.scale + servo_.update * leg_speed_);
-  noise_.legs = (felt_of_legs_.cwiseAbs2() * off.cwiseAbs2()).cwiseSqrt();
+  noise_.refresh({in.bias.noise(), in.carried, in.joints.q(), in.X_IP, in.robot.M_1(), in.weight});
 }
 
 }  // namespace ves

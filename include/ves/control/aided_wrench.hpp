@@ -6,52 +6,11 @@
 #pragma once
 
 #include "ves/control/hindsight.hpp"
-#include "ves/control/joint_momentum.hpp"
 #include "ves/control/mass_belief.hpp"
 #include "ves/control/moving_frame.hpp"
-#include "ves/control/sensor_bias.hpp"
+#include "ves/control/residual_gate.hpp"
 
 namespace ves {
-
-/// [1/s] The largest mean over so many samples, a period apart, of the acceleration that the wrench
-/// shows of a leg whose v_end steps by 1 m/s.
-double largestFelt(const ServoModel& servo, double period, std::size_t samples);
-
-/// What a residual may be without a force, by channel.
-struct ResidualNoise {
-  SensorNoise sensor;
-  Vec6 weight = Vec6::Zero();  // [count^2] from the attitude by rounded lengths, turning the weight
-  Vec6 legs = Vec6::Zero();    // [count s] of a leg that takes its next count, or what it is told,
-                               // sooner or later than modelled, and so goes K times that quicker;
-                               // per [1/s] of largestFelt()
-  Vec6 joints = Vec6::Zero();  // [count] of a sample from the joints' readings, which give their
-                               // momentum; of a mean it is what both its ends are off by
-};
-
-/// Whether the mean of residuals over some samples is more than noise, in any channel.
-class ResidualGate {
- public:
-  /// [-] samples: one, and groups of Lesson::kGroup.
-  static constexpr std::array<int, 6> kMeans = {1, 5, 10, 20, 60, 200};
-  /// What only means from this one on show is a force that lasts.
-  static constexpr std::size_t kLasting = 4;
-
-  explicit ResidualGate(const ControllerConfig& config);
-
-  /// `mean` [count] over so many samples; `unknown` [count^2] its variance for want of knowledge
-  /// of masses and bias.
-  bool exceeds(int samples, const Vec6& mean, const ResidualNoise& noise,
-               const Vec6& unknown) const noexcept;
-  /// [-] of the channel that is farthest from 0, in terms of what would be noise.
-  double excess(int samples, const Vec6& mean, const ResidualNoise& noise,
-                const Vec6& unknown) const noexcept;
-
- private:
-  Vec6 most(int samples, const ResidualNoise& noise, const Vec6& unknown) const noexcept;
-
-  double deviations_;                         // [-]
-  std::array<double, kMeans.size()> felt_{};  // [1/s] largestFelt()
-};
 
 /// The admittance model's input: the measured wrench, or the modelled one while they differ by no
 /// more than noise and what is not known of the masses explain.
@@ -88,7 +47,7 @@ class AidedWrench {
   /// Of the newest sample; zero unless the wrench is aided.
   const Wrench& reaction() const noexcept { return reaction_; }  // F_Po_I, modelled
   bool withholds() const noexcept { return withholds_; }         // the residual, or its noise
-  const ResidualNoise& noise() const noexcept { return noise_; }
+  const ResidualNoise& noise() const noexcept { return noise_.now(); }
   const MassBelief& belief() const noexcept { return belief_; }
   /// What the model has, and how well it is known.
   BodyMasses masses() const noexcept { return regressor_.described(used_, belief_.covariance()); }
@@ -133,26 +92,12 @@ class AidedWrench {
   void restart() noexcept;
   void doubtHand(const Mat6& counts_per_wrench) noexcept;
   void use() noexcept;
-  Mat6 countsPerWrench(const Mat3& R_IP) const noexcept;  // about Po in I
   void refreshNoise(const Input& in) noexcept;
-  void refreshLegs(const BodyMotion& P) noexcept;
-  Vec6 jointNoise(const Input& in) const noexcept;  // [count]
-  Vec6 momentumNoise() const noexcept;              // [count^2 s^2]
 
   bool aided_;
   int hold_;  // [-] samples
   Vec3 gravity_;
-  Geometry geometry_;
-  double period_;    // [s]
-  double rounding_;  // [m] of a leg, rms
-  ServoModel servo_;
-  Mat6 felt_of_legs_ = Mat6::Zero();    // [count s^2/m] by a leg's acceleration,
-  Mat6 rates_of_twist_ = Mat6::Zero();  // [m/s] of the legs by the platform's; as noise_ was found
-  Vec6 leg_speed_ = Vec6::Zero();       // [m/s] of late
-  JointVector joint_speed_;             // [rad/s | m/s] rms, by readings of joints
-  Transform X_SP_;
-  Mat6 S_proc_;  // [count per N | N m], and
-  Mat6 C_proc_;  // its inverse
+  SensorCounts counts_;
   Transform X_PL0_;
   MassRegressor regressor_;
   double common_;          // [-] deviation of all bodies' density,
@@ -160,9 +105,8 @@ class AidedWrench {
   MassVector most_;        // [-, m, kg, kg m] that a parameter may be
   Eigen::Vector4d hand_;   // [kg, kg m] deviations of what is in the hand, where that is not known
   double bias_deviation_;  // [count] before a calibration
-  double least_correlation_;  // [-] of the sensor's noise: a calibration tells it poorly
   ResidualGate gate_;
-  ResidualNoise noise_;
+  NoiseOfResidual noise_;
   Butterworth2<6> twist_;       // of the platform, as the wrench shows it
   bool settled_ = false;        // twist_
   int doubted_;                 // [-] samples for which the hand's load is doubted

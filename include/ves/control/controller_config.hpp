@@ -39,6 +39,11 @@ struct Compensation {
   double mass_error = 0.0;    // [-] of the robot's bodies, mass and centre
 
   bool any() const noexcept { return feed_forward || observer; }
+  /// [-] by which a body's mass and centre are learnt at most: twice, for a scale common to all
+  /// bodies and for its own.
+  double mostLearnt() const noexcept { return learns_masses ? 2.0 * mass_error : 0.0; }
+  static constexpr double kLeastLearnt = 0.1;  // [-] of a body's mass
+  static constexpr double kMostInHand = 3.0;   // [-] deviations of hand_mass and hand_center
 };
 
 /// How the laboratory flies along with the vehicle (control/moving_frame.hpp).
