@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // The stability check of a scenario: what it bars, what it names, and which cures it offers.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <complex>
@@ -398,6 +399,62 @@ TEST(Gate, LooksAtTheServosThatWereIdentified) {
   EXPECT_NEAR(
       loopOf(e.controller, e.plant.task.initial_joints, Direction::kExtending).velocity_gain,
       0.75 * nominal, 1e-12 * nominal);
+}
+
+// Twice mass_error is learnt at most. Where the truth is on the other side of the belief, the robot
+// is (1 + e) / (1 - 2 e) times as heavy as the model has it, or (1 - e) / (1 + 2 e) times.
+TEST(Gate, LooksAtTheMassesThatMayBeLearnt) {
+  std::vector<std::string> sets = test::kCompensated;
+  for (const char* set :
+       {"base.keep_modes=6", "sensor.readings_per_tick=4", "controller.compensation.wrench=aided",
+        "controller.compensation.learns_masses=true", "controller.compensation.hand_mass_kg=0",
+        "program=[{calibration: {}}, {admittance: {duration_s: 20}}]"})
+    sets.push_back(set);
+  for (const auto& [scenario, first] :
+       {std::pair{"srms_capture_puma", "lighter"}, {"srms_capture_doss", "heavier"}}) {
+    const bool heavy = std::string_view(first) == "heavier";
+    std::vector<std::string> damped;  // which what is too light does not bear
+    if (heavy) damped = {"base.arm.damping_ratio=0.05"};
+    Experiment e = test::experiment(scenario, sets, damped);
+    const auto admitted = [&](double mass_error) {
+      e.controller.compensation.mass_error = mass_error;
+      return isStable(e.controller, e.plant.task);
+    };
+    const auto decaysWith = [&](double times) {
+      const Compensation& c = e.controller.compensation;
+      for (const Direction direction : {Direction::kExtending, Direction::kRetracting})
+        for (const int gain : {1, -1})
+          for (const int timing : {1, -1}) {
+            Loop loop = loopOf(e.controller, e.plant.task.initial_joints, direction);
+            loop.robot_P = scaledDensity(times, loop.robot_P);
+            if (!decays(off(loop, {c.timing_error, c.gain_error, 0.0, 0.0}, timing, gain)))
+              return false;
+          }
+      return true;
+    };
+    const auto heavier = [](double error) { return (1.0 + error) / (1.0 - 2.0 * error); };
+    const auto lighter = [](double error) { return (1.0 - error) / (1.0 + 2.0 * error); };
+    const auto bears = [&](double error) {
+      return decaysWith(heavier(error)) && decaysWith(lighter(error));
+    };
+    double most = 0.0, grows = 0.45;
+    ASSERT_TRUE(bears(most) && !bears(grows));
+    while (grows - most > 1e-4) (bears(0.5 * (most + grows)) ? most : grows) = 0.5 * (most + grows);
+    EXPECT_TRUE(admitted(0.98 * most));
+    EXPECT_FALSE(admitted(1.02 * most));
+    const double by = heavy ? heavier(1.02 * most) - 1.0 : 1.0 - lighter(1.02 * most);
+    const std::string said = explain(assessStability(e.controller, e.plant.task));
+    EXPECT_NE(said.find(fmt::format("a robot {:.3g} % {}", 100.0 * by, first)), std::string::npos)
+        << said;
+    // So may what a gripper holds, which nobody tells.
+    e.controller.compensation.hand_mass = 1e3;
+    e.controller.hand.link = 5;
+    EXPECT_FALSE(admitted(0.0));
+    e.controller.hand = {};
+    EXPECT_TRUE(admitted(0.0));
+    e.controller.compensation.learns_masses = false;
+    EXPECT_TRUE(admitted(1.02 * most));
+  }
 }
 
 // An undamped base whose loop grows by less than a thousandth in a minute, and by much in a week.

@@ -15,9 +15,9 @@
 namespace ves {
 namespace {
 
-std::vector<CarriedRobot> bodies(const ControllerConfig& controller, const RobotTask& task) {
+std::vector<CarriedRobot> bodies(const std::vector<ProgramRobot>& robots) {
   std::vector<CarriedRobot> out;
-  for (const ProgramRobot& one : programRobots(controller, task)) out.push_back(one.body);
+  for (const ProgramRobot& one : robots) out.push_back(one.body);
   return out;
 }
 
@@ -28,7 +28,15 @@ class ProgramTime {
       : controller_(controller),
         task_(task),
         robot_(carried(controller.payload), task.initial_joints),
-        known_(robot_.model()) {}
+        known_(robot_.model()) {
+    const Compensation& c = controller.compensation;
+    if (!c.learns_masses || controller.hand.link < -1) return;
+    RobotModel weightless = known_;
+    for (int i = -1; i < weightless.size; ++i) weightless.bodyOf(i) = {};
+    hand_ =
+        withLoad(weightless, controller.hand.link,
+                 {Compensation::kMostInHand * c.hand_mass, controller.hand.p_LT_L, Mat3::Zero()});
+  }
 
   /// Everything of a segment, one instant after the other; see(robot) at each.
   template <class See>
@@ -70,7 +78,7 @@ class ProgramTime {
     const auto locked = [&](const RobotModel& robot) {
       return combine(RigidBody{}, controller_.payload.X_PL0(), compositeBody(robot, q));
     };
-    return {q, {locked(robot_.model()), locked(known_)}};
+    return {q, {locked(robot_.model()), locked(known_)}, hand_ ? locked(*hand_) : RigidBody()};
   }
 
  private:
@@ -78,7 +86,8 @@ class ProgramTime {
   const RobotTask& task_;
   MovingRobot robot_;
   RobotModel known_;
-  std::int64_t origin_ = 0;  // [ns] start of the segment
+  std::optional<RobotModel> hand_;  // its load and nothing else
+  std::int64_t origin_ = 0;         // [ns] start of the segment
 };
 
 /// [-] of the wrench for which a loop is judged: behind a dead band anything from all to nothing.
@@ -128,19 +137,38 @@ bool holds(const ControllerConfig& controller, const RobotTask& task, double gro
 Uncertainty uncertaintyOf(const Compensation& c) {
   // What was learnt may be as far on the other side of the belief as it is allowed to go.
   const double servos = c.adaptation ? 1.0 + c.adaptation_limit : 1.0;
-  return {servos * c.timing_error, servos * c.gain_error, c.mass_error};
+  const double learnt = std::min(c.mostLearnt(), 1.0 - Compensation::kLeastLearnt);
+  return {servos * c.timing_error, servos * c.gain_error,
+          (1.0 + c.mass_error) / (1.0 - learnt) - 1.0,
+          1.0 - (1.0 - c.mass_error) / (1.0 + c.mostLearnt())};
+}
+
+/// Robots that are heavier (1) or lighter (-1) than is believed: all of their bodies, or by what is
+/// in the hand.
+std::vector<CarriedRobot> mistaken(const std::vector<ProgramRobot>& robots, const Uncertainty& by,
+                                   int mass) {
+  const double times = mass > 0 ? 1.0 + by.heavier : 1.0 - by.lighter;
+  std::vector<CarriedRobot> out;
+  for (const ProgramRobot& one : robots) {
+    out.push_back(one.body);
+    out.back().robot_P = scaledDensity(times, one.body.robot_P);
+    if (!(one.in_hand.mass > 0.0)) continue;
+    out.push_back(one.body);
+    RigidBody& holds = mass > 0 ? out.back().robot_P : out.back().known_P;
+    holds = combine(holds, {}, one.in_hand);
+  }
+  return out;
 }
 
 /// Of the eight corners of what the belief may be off by, one where the loop grows.
 std::optional<std::array<int, 3>> cornerThatGrows(const ControllerConfig& controller,
                                                   const RobotTask& task, double growth,
-                                                  const std::vector<CarriedRobot>& robots) {
+                                                  const std::vector<ProgramRobot>& robots) {
   const Compensation& c = controller.compensation;
   if (!c.inertia) return {};
   const Uncertainty by = uncertaintyOf(c);
-  std::vector<CarriedRobot> heavy = robots, both = robots;
-  for (CarriedRobot& robot : heavy) robot.robot_P = scaledDensity(1.0 + by.mass, robot.robot_P);
-  for (CarriedRobot& robot : both) robot.robot_P = scaledDensity(1.0 - by.mass, robot.robot_P);
+  const std::vector<CarriedRobot> heavy = mistaken(robots, by, 1);
+  std::vector<CarriedRobot> both = mistaken(robots, by, -1);
   both.insert(both.end(), heavy.begin(), heavy.end());
   for (const int gain : {1, -1})
     for (const int timing : {1, -1}) {
@@ -178,8 +206,8 @@ double allowedGrowth(const ControllerConfig& controller) {
 }
 
 bool isStable(const ControllerConfig& controller, const RobotTask& task, double growth) {
-  const std::vector<CarriedRobot> robots = bodies(controller, task);
-  return holds(controller, task, growth, robots, [](Loop&) {}) &&
+  const std::vector<ProgramRobot> robots = programRobots(controller, task);
+  return holds(controller, task, growth, bodies(robots), [](Loop&) {}) &&
          !cornerThatGrows(controller, task, growth, robots);
 }
 
@@ -199,7 +227,8 @@ LoopVerdict assessStability(const ControllerConfig& controller, const RobotTask&
   LoopVerdict out;
   out.modes = static_cast<int>(linearised(controller.vehicle).stiffness.size());
   out.stable_modes = out.modes;
-  const std::vector<CarriedRobot> robots = bodies(controller, task);
+  const std::vector<ProgramRobot> program = programRobots(controller, task);
+  const std::vector<CarriedRobot> robots = bodies(program);
   const double growth = allowedGrowth(controller);
   const auto cured = [&](const auto& change) {
     return holds(controller, task, growth, robots, change);
@@ -208,15 +237,14 @@ LoopVerdict assessStability(const ControllerConfig& controller, const RobotTask&
   out.as_believed = cured([](Loop&) {});
   out.stable = out.as_believed;
   if (out.as_believed)
-    if (const auto corner = cornerThatGrows(controller, task, growth, robots)) {
+    if (const auto corner = cornerThatGrows(controller, task, growth, program)) {
       out.stable = false;
       out.off = *corner;
       out.uncertainty = uncertaintyOf(controller.compensation);
       const auto& [timing, gain, mass] = out.off;
       for (const Direction direction : directionsOf(controller))
         for (const Loop& loop : loopsOf(controller, task.initial_joints, direction))
-          for (CarriedRobot robot : robots) {
-            robot.robot_P = scaledDensity(1.0 + mass * out.uncertainty.mass, robot.robot_P);
+          for (const CarriedRobot& robot : mistaken(program, out.uncertainty, mass)) {
             const DominantRoot root =
                 dominantRoot(off(carrying(loop, robot), out.uncertainty, timing, gain));
             if (root.radius > out.at_off.radius) out.at_off = root;
@@ -290,7 +318,8 @@ std::string explain(const LoopVerdict& v) {
         "beliefs (timing_error_s, gain_error and mass_error of controller.compensation), a lighter "
         "robot or a heavier base",
         1e3 * v.uncertainty.timing, v.off[0] > 0 ? "later" : "earlier", 100.0 * v.uncertainty.gain,
-        v.off[1] > 0 ? "quicker" : "slower", 100.0 * v.uncertainty.mass,
+        v.off[1] > 0 ? "quicker" : "slower",
+        100.0 * (v.off[2] > 0 ? v.uncertainty.heavier : v.uncertainty.lighter),
         v.off[2] > 0 ? "heavier" : "lighter", explain(v.at_off, v.longest));
   Eigen::Index i = 0;
   v.worst.shape.cwiseAbs().maxCoeff(&i);

@@ -44,6 +44,7 @@ struct LoopVerdict {
 struct ProgramRobot {
   JointVector q;
   CarriedRobot body;  // with what it has in hand; what of that the controller has been told
+  RigidBody in_hand;  // what may be there that nobody tells, and may be learnt, in P
 
   bool operator==(const ProgramRobot&) const = default;
 };

@@ -77,9 +77,9 @@ struct Loop {
 
 /// What a belief may be wrong by, either way.
 struct Uncertainty {
-  double timing = 0.0;  // [s] of the wrench
-  double gain = 0.0;    // [-] of the servos
-  double mass = 0.0;    // [-] of the robot
+  double timing = 0.0;                  // [s] of the wrench
+  double gain = 0.0;                    // [-] of the servos
+  double heavier = 0.0, lighter = 0.0;  // [-] of the robot
 };
 
 /// The loop of a machine that is off in timing and gain, in directions of -1, 0 or 1.
