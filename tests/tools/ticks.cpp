@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 //   ticks                 the names of the cases
-//   ticks CASE [TIMES]    500 ticks of a controller under way, for what counts their instructions;
-//                         TIMES over, for what samples where their time goes
+//   ticks CASE [TIMES]    its ticks, for what counts their instructions; TIMES over, for what
+//   samples
+//                         where their time goes
 #include <fmt/format.h>
 
 #include <cstdlib>
@@ -19,10 +20,10 @@ __attribute__((noinline)) void countedTick(TestPlatform& platform, const TickInp
 int run(const std::string& name, int times) {
   for (const test::TickCase& one : test::tickCases()) {
     if (one.name != name) continue;
-    test::UnderWay run(one.set, one.scenario);
+    test::UnderWay run(one.set, one.scenario, one.since);
     const TestPlatform before = run.platform;
     std::vector<TickInput> inputs;
-    while (inputs.size() < 500) {
+    while (inputs.size() < static_cast<std::size_t>(one.ticks)) {
       run.step();
       inputs.push_back(run.used);
     }
