@@ -91,7 +91,8 @@ def write_tree(records, dropped):
 def build(_):
     flags = "-O1 -w -D_GLIBCXX_ASSERTIONS"  # with assert(): an index past the end is noticed
     configure = ["cmake", "-S", str(TREE), "-B", str(BUILD), "-G", "Ninja",
-                 "-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_CXX_FLAGS_RELEASE=" + flags]
+                 "-DCMAKE_CXX_COMPILER=clang++-14", "-DCMAKE_BUILD_TYPE=Release",
+                 "-DCMAKE_CXX_FLAGS_RELEASE=" + flags]
     records = json.loads((WORK / "mutants.json").read_text())
     dropped = set(json.loads((WORK / "dropped.json").read_text()))
     for _ in range(8):
@@ -102,7 +103,7 @@ def build(_):
             print(f"built; {len(dropped)} mutants are not C++")
             return
         bad = set()
-        for file, line in re.findall(r"^(\S+?):(\d+):\d+:\s+(?:error|required from)",
+        for file, line in re.findall(r"^(\S+?):(\d+):\d+:\s+(?:error|note: in inst)",
                                      made.stdout, re.M):
             if not file.startswith(str(TREE)):
                 continue
