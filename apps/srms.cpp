@@ -18,6 +18,8 @@ namespace {
 int showModes(const std::string& name, const std::vector<std::string>& overrides) {
   const Base base = loadBase(findBase(name, configFolder()), overrides);
   const ModalModel m = linearised(base.vehicle);
+  if (m.stiffness.size() == 0)
+    throw InputError(fmt::format("{}: gives way to no force, and has no modes", name));
   fmt::print("{:>4} {:>10} {:>8} {:>12}  {}\n", "mode", "[Hz]", "zeta", "mass [kg]",
              "shape at the robot's foot, in P: x y z [m], alpha beta gamma [rad]");
   for (Eigen::Index i = 0; i < m.stiffness.size(); ++i) {

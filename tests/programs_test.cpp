@@ -209,6 +209,7 @@ TEST_F(Programs, WhatAnOptionMeansNothingForIsRefused) {
       {"controller ramp --do home --log " + to, "--log: means nothing with the menu"},
       {"controller ramp --do home --flight " + to, "--flight: means nothing with the menu"},
       {"run ramp --seed 1 --set seed=2", "--seed: beside --set seed="},
+      {"srms modes deck", "has no modes"},
       {"conform ramp --set 'program=[{move: {}}]'", "--set program: means nothing"},
       {"accept z_sine --lockstep --tests steps --slow 0.001", "--slow: means nothing"},
       {"accept z_sine --lockstep --tests passes --amplitudes 0.5", "--amplitudes: means nothing"},

@@ -14,7 +14,10 @@ constexpr double kNormal = 1.96;  // [-] 95 % of a normal distribution
 constexpr int kHarmonics = 3;
 
 double student(std::size_t values) {
-  return quantile(boost::math::students_t(static_cast<double>(values - 1)), 0.975);
+  // In double: valgrind has no long double, and would end the program where Boost prepares its own.
+  using Double = boost::math::policies::policy<boost::math::policies::promote_double<false>>;
+  using Distribution = boost::math::students_t_distribution<double, Double>;
+  return quantile(Distribution(static_cast<double>(values - 1)), 0.975);
 }
 
 double mean(const std::vector<double>& values) {

@@ -91,12 +91,12 @@ Series readSeries(const std::string& log, const Experiment* without) {
       configured = true;
     }
     try {
-      if (const auto row = rows.add(event, log)) series.rows.push_back(*row);
+      if (auto row = rows.add(event, log)) series.rows.push_back(std::move(*row));
     } catch (const InputError& error) {
       series.damage.add(error.what());
     }
   }
-  if (const auto row = rows.finish()) series.rows.push_back(*row);
+  if (auto row = rows.finish()) series.rows.push_back(std::move(*row));
   if (!configured && without) {
     series.experiment = *without;
     configured = true;
@@ -122,11 +122,11 @@ class SeriesRecorder : public RunRecorder {
   void tick(const TickMessages& m, std::int64_t) override {
     rows_.add(m.truth);
     rows_.add(m.sample);
-    if (const auto row = rows_.add(m.state)) series_.rows.push_back(*row);
+    if (auto row = rows_.add(m.state)) series_.rows.push_back(std::move(*row));
   }
   void order(const operator_t&, std::int64_t) override {}
   void end() {
-    if (const auto row = rows_.finish()) series_.rows.push_back(*row);
+    if (auto row = rows_.finish()) series_.rows.push_back(std::move(*row));
   }
 
  private:
