@@ -680,8 +680,8 @@ class Client {
     if (recv(fd_, b, sizeof b, 0) != 36) return {};
     std::vector<std::int64_t> out;
     for (int i = 0; i < 9; ++i) {
-      const std::uint32_t n = static_cast<std::uint32_t>(b[4 * i]) << 24 | b[4 * i + 1] << 16 |
-                              b[4 * i + 2] << 8 | b[4 * i + 3];
+      std::uint32_t n = 0;
+      for (int k = 0; k < 4; ++k) n = n << 8 | b[4 * i + k];
       out.push_back(i < 3 ? static_cast<std::int64_t>(n) : static_cast<std::int32_t>(n));
     }
     return out;

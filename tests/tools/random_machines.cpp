@@ -174,7 +174,8 @@ int allMasses(int draws, unsigned seed, const Sets& set) {
         const Sets here = with(set, {std::string("gravity_m_per_s2=") + gravity}),
                    learns = with(here, {"controller.compensation.mass_error=0.1",
                                         "controller.compensation.learns_masses=true"});
-        const auto off = [&](const Sets& sets, int n, bool wrong, bool tilt) {
+        const auto off = [&, joint = joint, to = to](const Sets& sets, int n, bool wrong,
+                                                     bool tilt) {
           return cells(masses(scenario, joint, to, n, seed, sets, wrong, tilt));
         };
         constexpr int kExact = 2;  // [-] seeds of the noise, which it keeps out
