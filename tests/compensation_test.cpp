@@ -1167,6 +1167,25 @@ TEST(SensorTiming, FindsALaterSensorAnEarlierOneAndAHeavierRobot) {  // with the
       }
 }
 
+// They are of blocks of one run, and hold what is the same in every run, too.
+TEST(SensorTiming, ItsDeviationsAreAboutWhatItScattersBy) {
+  constexpr int kSeeds = 10;
+  Eigen::Array<double, kSeeds, 2> found, said;
+  for (int seed = 0; seed < kSeeds; ++seed) {
+    const Experiment e =
+        experiment("servo_identification", kPublished, {"seed=" + std::to_string(seed + 1)});
+    const SensorEstimate one = identifySensor(e.controller, Recorded(e).shake);
+    found.row(seed) << one.scale, one.delay;
+    said.row(seed) << one.scale_deviation, one.delay_deviation;
+  }
+  for (int k = 0; k < 2; ++k) {
+    const Eigen::ArrayXd off = found.col(k) - found.col(k).mean();
+    const double scatter = std::sqrt(off.square().sum() / (kSeeds - 1));
+    EXPECT_GT(said.col(k).mean(), 0.5 * scatter) << k;
+    EXPECT_LT(said.col(k).mean(), 4.0 * scatter) << k;
+  }
+}
+
 TEST(SensorTiming, RefusesAPlatformThatStandsAndARobotThatMoves) {
   Experiment e = experiment("servo_identification", kPublished,
                             {"program=[{move: {}}, {calibration: {}}, {move: {duration_s: 2}}]"});
