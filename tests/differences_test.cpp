@@ -1,12 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // What two runs differ in.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <cmath>
 
 #include "support/rig.hpp"
+#include "ves/evaluation/comparison.hpp"
 #include "ves/evaluation/differences.hpp"
 #include "ves/evaluation/evidence.hpp"
 #include "ves/evaluation/summary.hpp"
+#include "ves/run/run.hpp"
+#include "ves/series/series.hpp"
 
 namespace ves {
 namespace {
@@ -107,6 +112,93 @@ TEST(Summary, HasEachNumberOfARunUnderItsOwnName) {
   EXPECT_EQ(out.at("configuration_hash"), series.experiment.source.hash);
   result.wall = 0.0;
   EXPECT_EQ(summarise(series, result).at("real_time_factor"), 0.0);
+}
+
+// Whatever the numbers are: the table shows each in the unit beside it.
+TEST(Summary, TheTableShowsItsNumbersInTheUnitsBesideThem) {
+  const Experiment e = test::experiment(
+      "puma_on_table_4_1",
+      {"program=[{calibration: {}}, {admittance: {duration_s: 4}, robot: [{at_s: 0.5, duration_s: "
+       "1, joint: joint_1, to_deg_or_m: 20}]}, {trajectory: {duration_s: 2, z: {ramp: {to_m: "
+       "0.02}}}}]",
+       "controller.passivity.enabled=true"});
+  const RecordedRun run = recordLockstep(e);
+  nlohmann::ordered_json s = summarise(run.series, run.result);
+  const std::pair<const char*, double> numbers[] = {{"messages_lost", 14},
+                                                    {"log_events_lost", 15},
+                                                    {"messages_malformed", 16},
+                                                    {"tracking_delay_s", 0.0123},
+                                                    {"tracking_rms", 0.0456},
+                                                    {"tracking_paei_amplitude", 1.2345},
+                                                    {"tracking_paei_phase_rad", M_PI / 9.0},
+                                                    {"tracking_fdb_amplitude", 1.3456},
+                                                    {"tracking_fdb_phase_rad", M_PI / 12.0},
+                                                    {"energy_put_in_j", -0.0021},
+                                                    {"energy_put_in_max_j", 0.0032},
+                                                    {"energy_paid_j", 0.0043},
+                                                    {"dynamic_force_max_moving_n", 54.321},
+                                                    {"dynamic_moment_max_moving_nm", 65.432},
+                                                    {"tool_displacement_max_m", 0.0765},
+                                                    {"tool_displacement_rms_m", 0.0543},
+                                                    {"tool_error_rms_m", 0.0011},
+                                                    {"tool_error_max_m", 0.0022}};
+  s["log_trouble"] = "no room";
+  for (const auto& [key, value] : numbers) {
+    ASSERT_TRUE(s.contains(key)) << key;
+    if (s[key].is_number_float())
+      s[key] = value;
+    else
+      s[key] = static_cast<int>(value);
+  }
+  const std::string text = table(s);
+  for (const char* shown :
+       {"14 messages were lost", "no room: 15 events of the log lost", "16 malformed messages",
+        "late by 12.3 ms; rms 4.56 %, amplitude 1.2345, phase 20.00 deg (PAEI; by frequencies "
+        "1.3456, 15.00 deg)",
+        "put in -2.100 mJ, 3.200 at most; 4.300 mJ damped away",
+        "carried 76.500 mm off by the base (54.300 rms); off by 1.100 mm rms, 2.200 mm at most",
+        "moving  at most   54.321 N,   65.432 N m"})
+    EXPECT_NE(text.find(shown), std::string::npos) << shown << "\n" << text;
+}
+
+// What the emulation gave and what was damped away are those of the last tick of it.
+TEST(Summary, EnergiesAreThoseOfTheLastTickAndTheMost) {
+  for (const bool passive : {true, false}) {
+    RecordedRun run = recordLockstep(test::experiment(
+        "puma_on_table_4_1", {"program=[{calibration: {}}, {admittance: {duration_s: 0.5}}]",
+                              fmt::format("controller.passivity.enabled={}", passive)}));
+    double n = 0.0;
+    for (Row& row : run.series.rows) {
+      row.state.energy_put_in = n < 5.0 ? 100.0 + n : n;
+      row.state.energy_paid = 2.0 * n;
+      n += inAdmittance(row.state) ? 1.0 : 0.0;
+    }
+    ASSERT_GT(n, 20.0);
+    const auto s = summarise(run.series, run.result);
+    EXPECT_EQ(s.at("energy_put_in_j"), n - 1.0);
+    EXPECT_EQ(s.at("energy_put_in_max_j"), 104.0);
+    EXPECT_EQ(s.contains("energy_paid_j"), passive);
+    if (passive) {
+      EXPECT_EQ(s.at("energy_paid_j"), 2.0 * (n - 1.0));
+    }
+  }
+}
+
+// Of a base that swings along x alone: where else the platform stands is no motion of it.
+TEST(Emulation, AnAmplitudeIsFromWhereTheBaseIsAtRest) {
+  const Experiment e = test::experiment(
+      "ramp", {"base=!replace {modes: {frequency_hz: [0.3], damping_ratio: [0.02], "
+               "generalized_mass: [1], shapes: [[0.05], [0], [0], [0], [0], [0]], "
+               "platform_rpy_deg: [0, 0, 0]}, keep_modes: 1}"});
+  Motion base;
+  for (const double swing : {0.01, -0.02, 0.015}) {
+    base.t.push_back(0.01 * static_cast<double>(base.t.size()));
+    base.x.push_back((Vec6() << swing, 0.0, 0.03, 0.0, -0.1, 0.0).finished());
+    base.x_dot.push_back(Vec6::Zero());
+  }
+  const Amplitude a = amplitude(e, base);
+  EXPECT_NEAR(a.position, 0.02, 1e-12);
+  EXPECT_NEAR(a.attitude, 0.0, 1e-12);
 }
 
 TEST(Differences, NameTheLeavesThatWereChanged) {

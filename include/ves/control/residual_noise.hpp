@@ -42,7 +42,7 @@ struct ResidualNoise {
   Vec6 ofMean(int samples) const noexcept;
 };
 
-/// It, as the machine moves.
+/// ResidualNoise, kept up to date while the machine moves.
 class NoiseOfResidual {
  public:
   explicit NoiseOfResidual(const ControllerConfig& config);
