@@ -12,6 +12,7 @@
 #include "support/robots.hpp"
 #include "ves/config/masses.hpp"
 #include "ves/control/gravity_compensation.hpp"
+#include "ves/evaluation/static_intervals.hpp"
 #include "ves/identification/scenario.hpp"
 #include "ves/plant/force_torque_sensor.hpp"
 #include "ves/validation/iterative_compensation.hpp"
@@ -433,6 +434,48 @@ TEST_F(Identify, RefusesByName) {
                                      "  - {mass_kg: -1, moment_kg_m: [0, 0, 0]}\n";
   expectRefusal(app("run") + "puma_tilt --lockstep --masses " + file("bad.yaml") + out("y"),
                 "bodies[0].mass_kg");
+}
+
+// Platform and robot stand twice; in between a leg leaves by a count more than is allowed.
+TEST(StaticIntervals, AreTheStretchesInWhichAllStands) {
+  Series series;
+  series.experiment = test::experiment("puma_on_table_4_1");
+  const int allowed = series.experiment.controller.stillness.leg_counts;
+  const auto put = [&](int leg_counts, double x_dot, bool sampled) {
+    Row row;
+    const auto k = series.rows.size();
+    row.t = 0.01 * static_cast<double>(k);
+    row.has_sample = sampled;
+    row.sample.legs[2] = 5000 + leg_counts;
+    row.sample.q[1] = 0.3;
+    for (int c = 0; c < kWrenchChannels; ++c) row.sample.adc[c] = 100 * c + (k % 2 ? 1 : -1);
+    row.state.x_measured[4] = -0.1;
+    row.state.x_dot[0] = x_dot;
+    series.rows.push_back(row);
+  };
+  for (int k = 0; k < 500; ++k) put(k % 2 ? allowed : 0, 0.0, true);  // to 4.99 s
+  for (int k = 0; k < 30; ++k) put(1000 * k, 1e-3, true);
+  for (int k = 0; k < 400; ++k) put(0, 0.0, true);  // 5.3 to 9.29 s
+  put(0, 0.0, false);
+  for (int k = 0; k < 50; ++k) put(0, 0.0, true);  // too short
+  const std::vector<StaticInterval> found = staticIntervals(series);
+  ASSERT_EQ(found.size(), 2u);
+  const double ends[][2] = {{0.0, 4.99}, {5.3, 9.29}};
+  for (std::size_t i = 0; i < 2; ++i) {
+    const auto& [first, last] = ends[i];
+    const StaticInterval& rest = found[i];
+    EXPECT_GT(rest.t - 0.5 * rest.duration, first + 0.1);  // the filter settles
+    EXPECT_LT(rest.t + 0.5 * rest.duration, last + 0.01);
+    EXPECT_GT(rest.t + 0.5 * rest.duration, last - 0.5);
+    EXPECT_GT(rest.duration, 1.0);
+    for (int c = 0; c < kWrenchChannels; ++c) EXPECT_NEAR(rest.counts(c), 100.0 * c, 0.02);
+    EXPECT_NEAR(rest.q(1), 0.3, 1e-12);
+    EXPECT_NEAR(rest.rpy(1), -0.1, 1e-12);
+  }
+  // One count more than is allowed is another stretch.
+  for (Row& row : series.rows)
+    if (row.sample.legs[2] == 5000 + allowed) row.sample.legs[2] += 1;
+  EXPECT_EQ(staticIntervals(series).size(), 1u);
 }
 
 }  // namespace

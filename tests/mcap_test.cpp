@@ -116,6 +116,7 @@ TEST(Mcap, IsAsTheSpecificationHasIt) {
     if (r.opcode == 8) {  // a chunk's index points at a chunk
       const auto offset = number<std::uint64_t>(r.content, 16);
       EXPECT_EQ(bytes[offset], 6);
+      EXPECT_EQ(number<std::uint64_t>(r.content, 24), 9 + number<std::uint64_t>(bytes, offset + 1));
     }
   }
   EXPECT_EQ(messages, kMessages);

@@ -197,6 +197,7 @@ TEST_P(ToolPath, RefusesWhatTheArmCannotDo) {
   EXPECT_EQ(refused({from, {}, 1.0, 0.0}), "the tool is there already");
   EXPECT_EQ(refused({{rotation({0.1, 0, 0}) * from.R, from.p}, {}, 0.0, 0.1}),
             "the tool only turns, want duration_s");
+  EXPECT_EQ(refused({{rotation({1e-3, 0, 0}) * from.R, from.p}, {}, 0.9, 0.0}), "");
   EXPECT_EQ(refused({{from.R, from.p + Vec3(0.2, 0, 0)}, Vec3(from.p + Vec3(0.1, 0, 0)), 1.0, 0.0}),
             "its start, via and its end are on one line, want three points of an arc");
 }
