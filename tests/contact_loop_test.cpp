@@ -5,9 +5,11 @@
 
 #include "support/refusal.hpp"
 #include "support/rig.hpp"
+#include "support/robots.hpp"
 #include "ves/analysis/gate.hpp"
 #include "ves/analysis/leaning.hpp"
 #include "ves/math/dense.hpp"
+#include "ves/planning/tool_planner.hpp"
 #include "ves/srms/interaction.hpp"
 
 namespace ves {
@@ -223,6 +225,40 @@ TEST(ExpectedContacts, AreFoundWhereTheRobotGoes) {
   // Without admittance control nothing answers.
   const Experiment elsewhere = test::experiment("puma_on_table_4_1");
   EXPECT_TRUE(expectedContacts(elsewhere.controller, elsewhere.plant.task).empty());
+}
+
+// A feeler away from the tool's origin also moves because the tool turns.
+TEST(ExpectedContacts, CloseAsFastAsTheFeelerMoves) {
+  const UrdfRobot puma = test::robot("puma560");
+  const NamedFrame& tip = puma.frames.back();
+  const ToolPlanner planner(puma.model, tip.link, tip.X_link, puma.fastest, puma.joint_names, 0.01);
+  for (const Vec3 at : {Vec3(0.0, 0.0, 0.2), Vec3(0.0, 0.0, -0.2), Vec3(0.2, 0.0, 0.0)}) {
+    const Experiment standing = test::experiment("puma_on_table_4_1");
+    const JointVector from = standing.plant.task.initial_joints;
+    const Mat3 R_PL0 = standing.controller.payload.X_PL0().R;
+    const double ahead = (R_PL0 * planner.pose(from).R * at).x();  // of the tool's origin
+    const Experiment e = test::experiment(
+        "puma_on_table_4_1",
+        {"gravity_m_per_s2=0", "initial_pose={}",
+         "program=[{move: {}}, {admittance: {duration_s: 4}, robot: [{at_s: 1, joint: joint_2, "
+         "to_deg_or_m: -80, duration_s: 2}]}]",
+         fmt::format("environment={{tool: [{{at_m: [{}, {}, {}], radius_m: 0.4}}], contact: "
+                     "{{stiffness: 2000}}, bodies: [{{from_tool_m: [{}, 0, 0], rpy_deg: [0, -90, "
+                     "0], half_space: {{}}}}]}}",
+                     at.x(), at.y(), at.z(), ahead + 0.401)});
+    const auto x = [&](double t) {
+      const double s = std::clamp((t - 1.0) / 2.0, 0.0, 1.0);
+      JointVector q = from;
+      q(1) += (-80.0 * kDegree - from(1)) * s * s * s * (10.0 - 15.0 * s + 6.0 * s * s);
+      return (R_PL0 * (planner.pose(q) * at)).x();
+    };
+    double fastest = 0.0;
+    for (double t = 1.0; t < 3.0; t += 1e-3)
+      fastest = std::max(fastest, (x(t + 1e-4) - x(t - 1e-4)) / 2e-4);
+    const std::vector<ExpectedContact> all = expectedContacts(e.controller, e.plant.task);
+    ASSERT_EQ(all.size(), 1U);
+    EXPECT_NEAR(all[0].speed, fastest, 5e-3 * fastest) << at.transpose();
+  }
 }
 
 // From the surface of the tool's ball on.
