@@ -442,7 +442,7 @@ TEST(StaticIntervals, AreTheStretchesInWhichAllStands) {
   series.experiment = test::experiment("puma_on_table_4_1");
   const int allowed = series.experiment.controller.stillness.leg_counts;
   const auto put = [&](int leg_counts, double x_dot, bool sampled) {
-    Row row;
+    Row row{};
     const auto k = series.rows.size();
     row.t = 0.01 * static_cast<double>(k);
     row.has_sample = sampled;
