@@ -454,20 +454,24 @@ TEST(Acceptance, ShowsNoiseBesideASineAndTheLagInALoop) {
   EXPECT_TRUE(find(with_gaps, Quantity::kThreshold));
 }
 
-TEST(Measurements, AreShownInTheUnitTheyAreCalledBy) {
-  const auto is = [](Quantity quantity, bool turns, const char* name, double per_si) {
+TEST(Measurements, AreShownAndLimitedInTheUnitsTheyAreCalledBy) {
+  constexpr double kTurn = 180.0 / M_PI;
+  const auto is = [](Quantity quantity, bool turns, const char* name, double per_si,
+                     const char* key, double key_si) {
     const Unit unit = unitOf(quantity, turns);
     EXPECT_STREQ(unit.name, name);
     EXPECT_DOUBLE_EQ(unit.per_si, per_si) << name;
+    EXPECT_STREQ(unit.key, key);
+    EXPECT_DOUBLE_EQ(unit.key_si, key_si) << key;
   };
-  is(Quantity::kGain, false, "", 1.0);
-  is(Quantity::kPhase, false, "deg", 180.0 / M_PI);
-  is(Quantity::kCorner, true, "Hz", 1.0);
-  is(Quantity::kLag, true, "ms", 1000.0);
-  is(Quantity::kHysteresis, false, "mm", 1000.0);
-  is(Quantity::kHysteresis, true, "deg", 180.0 / M_PI);
-  is(Quantity::kRestAcceleration, false, "m/s^2", 1.0);
-  is(Quantity::kRestAcceleration, true, "deg/s^2", 180.0 / M_PI);
+  is(Quantity::kGain, false, "", 1.0, "", 1.0);
+  is(Quantity::kPhase, false, "deg", kTurn, "_deg", 1.0 / kTurn);
+  is(Quantity::kCorner, true, "Hz", 1.0, "_hz", 1.0);
+  is(Quantity::kLag, true, "ms", 1000.0, "_s", 1.0);
+  is(Quantity::kHysteresis, false, "mm", 1000.0, "_m", 1.0);
+  is(Quantity::kHysteresis, true, "deg", kTurn, "_deg", 1.0 / kTurn);
+  is(Quantity::kRestAcceleration, false, "m/s^2", 1.0, "_m_per_s2", 1.0);
+  is(Quantity::kRestAcceleration, true, "deg/s^2", kTurn, "_deg_per_s2", 1.0 / kTurn);
 }
 
 TEST(Acceptance, VerdictsFollowTheWholeInterval) {
@@ -544,6 +548,8 @@ TEST_F(Accept, LeavesAPageANumberTableAndAVerdict) {
   EXPECT_EQ(broken.status, 1) << broken.text;
   EXPECT_NE(broken.text.find("BROKEN"), std::string::npos) << broken.text;
   EXPECT_NE(test::readText(file("b/accept.html")).find("BROKEN"), std::string::npos);
+  EXPECT_EQ(test::sh(z + out("n")).status, 0);  // nothing was asked of it
+  EXPECT_EQ(test::readText(file("n/accept.html")).find("What was asked"), std::string::npos);
   const test::Output missing =
       test::sh(z + out("c") + limits("limits: [{quantity: hysteresis, of: [z], most_m: 0.1}]\n"));
   EXPECT_EQ(missing.status, 2) << missing.text;  // before anything moves
