@@ -232,7 +232,7 @@ TEST(ExpectedContacts, CloseAsFastAsTheFeelerMoves) {
   const UrdfRobot puma = test::robot("puma560");
   const NamedFrame& tip = puma.frames.back();
   const ToolPlanner planner(puma.model, tip.link, tip.X_link, puma.fastest, puma.joint_names, 0.01);
-  for (const Vec3 at : {Vec3(0.0, 0.0, 0.2), Vec3(0.0, 0.0, -0.2), Vec3(0.2, 0.0, 0.0)}) {
+  for (const Vec3& at : {Vec3(0.0, 0.0, 0.2), Vec3(0.0, 0.0, -0.2), Vec3(0.2, 0.0, 0.0)}) {
     const Experiment standing = test::experiment("puma_on_table_4_1");
     const JointVector from = standing.plant.task.initial_joints;
     const Mat3 R_PL0 = standing.controller.payload.X_PL0().R;

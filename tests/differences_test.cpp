@@ -161,6 +161,57 @@ TEST(Summary, TheTableShowsItsNumbersInTheUnitsBesideThem) {
     EXPECT_NE(text.find(shown), std::string::npos) << shown << "\n" << text;
 }
 
+TEST(Evidence, OfACalibrationNamesWhatMovedByHowMuchAndTheKey) {
+  Experiment e = ramp();
+  e.controller.stillness = {3, 0.004, 25.0, 1500.0};
+  const auto said = [&](StillnessViolation violation, int index, double amount) {
+    state_t s{};
+    s.violation = static_cast<decltype(s.violation)>(violation);
+    s.violation_index = index;
+    s.violation_amount = amount;
+    return stillnessViolation(s, e);
+  };
+  EXPECT_EQ(said(StillnessViolation::kLeg, 2, 7.0),
+            "leg 3 moved by 7 counts (3 allowed: controller.still.leg_counts)");
+  EXPECT_EQ(said(StillnessViolation::kJoint, 1, 0.0123),
+            "joint_2 moved by 0.0123 rad (0.004 allowed: controller.still.joint_rad_or_m)");
+  EXPECT_EQ(said(StillnessViolation::kJoint, 7, 0.0123).substr(0, 7), "joint 8");
+  EXPECT_EQ(said(StillnessViolation::kChannel, 4, 31.25),
+            "my scatters by 31.2 counts (25 allowed: controller.still.deviation_counts): something "
+            "shakes it");
+  EXPECT_EQ(said(StillnessViolation::kBias, 0, 1600.0).substr(0, 79),
+            "fx would have a bias of 1600 counts (1500 allowed: controller.still.bias_v): it");
+  e.robot.joint_names.resize(1);
+  EXPECT_EQ(said(StillnessViolation::kJoint, 1, 0.0123).substr(0, 7), "joint 2");
+}
+
+TEST(Summary, TheTableShowsFiveContactsBesideThoseInFreeSpace) {
+  Series series;
+  series.experiment = ramp();
+  nlohmann::ordered_json s = summarise(series, RunResult());
+  s["contacts"] = 7;
+  s["contacts_free_space"] = 6;
+  s["contact_list"] = nlohmann::ordered_json::array();
+  for (int k = 0; k < 7; ++k)
+    s["contact_list"].push_back({{"began_s", 1.0 + k},
+                                 {"duration_s", 0.0251},
+                                 {"peak_n", 12.346},
+                                 {"restitution", 0.98765},
+                                 {"free_space_began_s", 1.5 + k},
+                                 {"free_space_duration_s", 0.0262},
+                                 {"free_space_peak_n", 11.234},
+                                 {"free_space_restitution", nullptr}});
+  const std::string text = table(s);
+  EXPECT_NE(text.find("contact  7 in the run, 6 on the base in free space"), std::string::npos);
+  EXPECT_NE(
+      text.find("1: after 1.00 (1.50) s for 25.1 (26.2) ms, peak 12.35 (11.23) N, restitution "
+                "0.9877 (-)"),
+      std::string::npos)
+      << text;
+  EXPECT_NE(text.find("5: after 5.00"), std::string::npos);
+  EXPECT_EQ(text.find("6: after"), std::string::npos);
+}
+
 // What the emulation gave and what was damped away are those of the last tick of it.
 TEST(Summary, EnergiesAreThoseOfTheLastTickAndTheMost) {
   for (const bool passive : {true, false}) {

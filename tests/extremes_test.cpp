@@ -22,7 +22,7 @@ constexpr int kOneOf = 6;  // settings
 #else
 constexpr int kOneOf = 1;
 #endif
-constexpr int kTicks = 250;
+constexpr int kTicksOfEach = 250;
 
 /// The least and the most that its reader takes of a number, and every other word.
 std::vector<std::string> extremes(const std::string& now, const AskedKey& asked) {
@@ -64,7 +64,7 @@ std::string run(const Experiment& e) {
   plant::Plant plant(e.plant);
   TickInput in;
   in.order.request = Request::kStart;
-  while (in.tick < kTicks) {
+  while (in.tick < kTicksOfEach) {
     in.sample = plant.sample();
     in.time = plant.time();
     const TickState& state = platform.tick(in);
