@@ -325,7 +325,7 @@ TEST(LetGo, SaysWhyItCannotBeCompared) {
 // It says when the motion in free space is another one, and only then: somebody computes it anew.
 TEST(LetGo, SaysWhenSomethingElseHappened) {
   LetGo let_go(test::experiment("satellite_jets"));
-  Row row;
+  Row row{};
   row.state = {};
   EXPECT_FALSE(let_go.add(row));
   EXPECT_FALSE(let_go.begun());

@@ -530,7 +530,7 @@ TEST(ContactResults, TheMostEnergyPutInIsThatOfAnyTick) {
   const auto most = [&](const std::vector<double>& put_in) {
     series.rows.clear();
     for (const double joules : put_in) {
-      Row row;
+      Row row{};
       row.state = {};
       row.state.phase = static_cast<int>(Phase::kRunning);
       row.state.kind = static_cast<int>(SegmentKind::kAdmittance);

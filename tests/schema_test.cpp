@@ -365,7 +365,7 @@ TEST(Schema, EveryFieldHasItsColumnsWithTheirUnits) {
   FreeBodyModel floats;
   floats.propulsion.size = kMostThrusters;
   e.controller.vehicle = floats;
-  Row row;
+  Row row{};
   row.state = toMessage(filled<TickState>(), header({1, 2}, 3, 4));
   const std::vector<Column> all = columns(e);
   const std::vector<std::string> names = cells(csvHeader(all)), values = cells(csvRow(all, row));

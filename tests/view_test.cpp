@@ -332,7 +332,7 @@ TEST(Scene, TheArmEndsInThePlatformAndStandsAtItsRoot) {
       0.3048 + std::hypot(6.3767, 0.1524) + std::hypot(7.0599, 0.1524) + 0.4572 + 2 * 0.7112, 1e-6);
   const Eigen::VectorXd eta = Eigen::Vector3d(0.3, -0.2, 0.1);
   const Vec6 x = linearised(e.controller.vehicle).Phi * eta;
-  Row row;
+  Row row{};
   Vec6::Map(row.state.x_measured) = x;
   const std::vector<float> picture = scene.picture(row, {});
   const float* arm = picture.data() + 7 * scene.description()["frames"].size();
