@@ -11,8 +11,7 @@
 #include "support/rig.hpp"
 #include "support/robots.hpp"
 #include "ves/config/keys.hpp"
-#include "ves/control/test_platform.hpp"
-#include "ves/plant/plant.hpp"
+#include "ves/plant/lockstep.hpp"
 
 namespace ves {
 namespace {
@@ -60,22 +59,16 @@ void walk(Value& value, const AskedKey& asked, const std::string& path,
 
 /// What its commands are, tick by tick, until something of them is no number.
 std::string run(const Experiment& e) {
-  TestPlatform platform(e.controller);
-  plant::Plant plant(e.plant);
-  TickInput in;
-  in.order.request = Request::kStart;
-  while (in.tick < kTicksOfEach) {
-    in.sample = plant.sample();
-    in.time = plant.time();
-    const TickState& state = platform.tick(in);
+  Lockstep machine(e.controller, e.plant);
+  machine.gate = false;  // whatever the machine says reaches the controller
+  for (int tick = 0; tick < kTicksOfEach; ++tick) {
+    const TickState& state = machine.step({Request::kStart, {}, {}});
     const Laboratory& lab = state.command.laboratory;
     if (!state.motion.x.allFinite() || !state.reference.allFinite() || !state.legs.L.allFinite() ||
         !lab.E_H.v.allFinite())
-      return fmt::format("no number in tick {}", in.tick);
+      return fmt::format("no number in tick {}", tick);
     for (const std::int32_t count : state.command.counts)
-      if (count < 0 || count > 16383) return fmt::format("{} counts in tick {}", count, in.tick);
-    plant.command(state.command);
-    plant.advance(++in.tick * e.controller.period);
+      if (count < 0 || count > 16383) return fmt::format("{} counts in tick {}", count, tick);
   }
   return {};
 }
