@@ -21,75 +21,6 @@ std::vector<CarriedRobot> bodies(const std::vector<ProgramRobot>& robots) {
   return out;
 }
 
-/// The robot of a program as its time goes on.
-class ProgramTime {
- public:
-  ProgramTime(const ControllerConfig& controller, const RobotTask& task)
-      : controller_(controller),
-        task_(task),
-        robot_(carried(controller.payload), task.initial_joints),
-        known_(robot_.model()) {
-    const Compensation& c = controller.compensation;
-    if (!c.learns_masses || controller.hand.link < -1) return;
-    RobotModel weightless = known_;
-    for (int i = -1; i < weightless.size; ++i) weightless.bodyOf(i) = {};
-    hand_ =
-        withLoad(weightless, controller.hand.link,
-                 {Compensation::kMostInHand * c.hand_mass, controller.hand.p_LT_L, Mat3::Zero()});
-  }
-
-  /// Everything of a segment, one instant after the other; see(robot) at each.
-  template <class See>
-  void pass(int segment, const See& see) {
-    constexpr int kInstants = 12;     // [-] along each motion
-    std::set<std::int64_t> instants;  // [ns]
-    std::vector<RobotEvent> events;
-    for (const RobotEvent& event : task_.robot_events) {
-      if (event.cue.segment != segment) continue;
-      events.push_back(event);
-      const double duration = durationOf(event.action);
-      for (int k = 0; k <= kInstants; ++k)
-        instants.insert(event.cue.after + std::llround(duration * 1e9 * k / kInstants));
-    }
-    std::vector<ToldLoad> told;
-    for (int i = 0; i < controller_.told_loads.size; ++i) {
-      const ToldLoad& load = controller_.told_loads.loads[static_cast<std::size_t>(i)];
-      if (load.cue.segment != segment) continue;
-      told.push_back(load);
-      instants.insert(load.cue.after);
-    }
-    std::stable_sort(events.begin(), events.end(),
-                     [](const auto& a, const auto& b) { return a.cue.after < b.cue.after; });
-    auto next = events.begin();
-    auto next_told = told.begin();
-    for (const std::int64_t now : instants) {
-      for (; next != events.end() && next->cue.after <= now; ++next)
-        robot_.begin(next->action, origin_ + next->cue.after);
-      for (; next_told != told.end() && next_told->cue.after <= now; ++next_told)
-        known_ = withLoad(carried(controller_.payload), next_told->link, next_told->body);
-      see(look(now));
-    }
-    if (!instants.empty()) origin_ += *instants.rbegin();  // all has come to rest
-  }
-
-  /// `now` [ns] of the segment.
-  ProgramRobot look(std::int64_t now = 0) const {
-    const JointVector q = robot_.at(origin_ + now).q;
-    const auto locked = [&](const RobotModel& robot) {
-      return combine(RigidBody{}, controller_.payload.X_PL0(), compositeBody(robot, q));
-    };
-    return {q, {locked(robot_.model()), locked(known_)}, hand_ ? locked(*hand_) : RigidBody()};
-  }
-
- private:
-  const ControllerConfig& controller_;
-  const RobotTask& task_;
-  MovingRobot robot_;
-  RobotModel known_;
-  std::optional<RobotModel> hand_;  // its load and nothing else
-  std::int64_t origin_ = 0;         // [ns] start of the segment
-};
-
 /// [-] of the wrench for which a loop is judged: behind a dead band anything from all to nothing.
 std::vector<double> feltShares(const ControllerConfig& controller) {
   if (controller.wrench_filter.dead_band.isZero(0.0)) return {1.0};
@@ -181,24 +112,6 @@ std::optional<std::array<int, 3>> cornerThatGrows(const ControllerConfig& contro
 }
 
 }  // namespace
-
-std::vector<ProgramRobot> programRobots(const ControllerConfig& controller, const RobotTask& task) {
-  const Program& program = controller.program;
-  const auto felt = [&](int i) {
-    return i < program.size &&
-           program.segments[static_cast<std::size_t>(i)].kind == SegmentKind::kAdmittance;
-  };
-  ProgramTime time(controller, task);
-  std::vector<ProgramRobot> out = {time.look()};
-  for (int i = 0; i < program.size; ++i) {
-    const ProgramRobot begins = time.look();
-    if (felt(i) && begins != out.back()) out.push_back(begins);
-    time.pass(i, [&](const ProgramRobot& robot) {
-      if (felt(i) || felt(i + 1)) out.push_back(robot);  // a motion may outlast its segment
-    });
-  }
-  return out;
-}
 
 double allowedGrowth(const ControllerConfig& controller) {
   const double longest = controller.longestAdmittance();
