@@ -22,6 +22,7 @@ namespace ves::app {
 
 void catchSignals() {
   struct sigaction action {};
+  action.sa_flags = SA_RESTART;  // a write goes on: a stream holds an interrupted one for an error
   action.sa_handler = [](int) { stop_requested = 1; };
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
