@@ -118,22 +118,28 @@ int servo(const std::string& log, const std::string& scenario, const std::string
   const Series series = seriesOf(log, scenario);
   const IdentifiedServo all = orRefuse(log, [&] { return identifiedServo(series); });
   const ServoEstimate& found = all.legs;
-  const bool open = !found.servo.opening.isZero(0.0);
-  fmt::print("{:>3}{:>22}{:>22}{:>20}{:>20}{}{:>12}\n", "leg", "extending [1/s]",
+  const auto more = [&](Vec6 ServoModel::*value, const auto& text) {
+    return (found.servo.*value).isZero(0.0) ? "" : fmt::format("{:>18}", text());
+  };
+  fmt::print("{:>3}{:>22}{:>22}{:>20}{:>20}{}{}{:>12}\n", "leg", "extending [1/s]",
              "retracting [1/s]", "tau [ms]", "delay [ms]",
-             open ? fmt::format("{:>18}", "open [um]") : "", "rest [um]");
+             more(&ServoModel::opening, [] { return "open [um]"; }),
+             more(&ServoModel::friction, [] { return "seals [um]"; }), "rest [um]");
   for (int i = 0; i < kLegs; ++i) {
     const auto cell = [&](Vec6 ServoModel::*value, double scale) {
       return fmt::format("{:.3f} +- {:.3f}", scale * (found.servo.*value)(i),
                          scale * (found.deviation.*value)(i));
     };
-    fmt::print(
-        "{:>3}{:>22}{:>22}{:>20}{:>20}{}{:>12.1f}\n", i + 1, cell(&ServoModel::extend, 1.0),
-        cell(&ServoModel::retract, 1.0), cell(&ServoModel::tau, 1e3), cell(&ServoModel::delay, 1e3),
-        open ? fmt::format("{:>18}", fmt::format("{:.0f} +- {:.0f}", found.servo.opening(i) * 1e6,
-                                                 found.deviation.opening(i) * 1e6))
-             : "",
-        found.residual(i) * 1e6);
+    const auto um = [&](Vec6 ServoModel::*value) {
+      return more(value, [&] {
+        return fmt::format("{:.0f} +- {:.0f}", (found.servo.*value)(i)*1e6,
+                           (found.deviation.*value)(i)*1e6);
+      });
+    };
+    fmt::print("{:>3}{:>22}{:>22}{:>20}{:>20}{}{}{:>12.1f}\n", i + 1,
+               cell(&ServoModel::extend, 1.0), cell(&ServoModel::retract, 1.0),
+               cell(&ServoModel::tau, 1e3), cell(&ServoModel::delay, 1e3), um(&ServoModel::opening),
+               um(&ServoModel::friction), found.residual(i) * 1e6);
   }
   // Slow motions leave tau to the rounding of counts, which no deviation knows of.
   const double tau = found.servo.tau.mean(), told = series.experiment.controller.servo.tau.mean();

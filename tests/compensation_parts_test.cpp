@@ -346,8 +346,8 @@ TEST(FeedForward, LeadsARampByItsDelayToo) {
   }
 }
 
-/// A valve whose edges are both open at null by `open`, as (2.11) has them under constant pressure:
-/// what the supply's edge lets in less what the return's lets out.
+/// A valve whose edges are both open at null by `open`, or overlap, as (2.11) has them under
+/// constant pressure: what the supply's edge lets in less what the return's lets out.
 double orifices(double up, double down, double open, double E) {
   const double rest = open * (down - up) / (up + down),  // where as much goes in as out
       x = E + rest;
@@ -380,6 +380,126 @@ TEST(ServoModel, OfAnOpenValveIsWhatItsOrificesPass) {
     EXPECT_EQ(speedOf(servo, 2, 0.0), 0.0);
     EXPECT_EQ(differenceOf(servo, 2, 0.0), 0.0);
   }
+}
+
+TEST(ServoModel, OfEdgesThatOverlapIsWhatPassesBeyond) {
+  ServoModel servo = experiment("z_sine", kCompensated).controller.servo;
+  servo.opening.setConstant(-3e-4);
+  const double up = servo.extend(2), down = servo.retract(2);
+  double last = -HUGE_VAL, steepest_way = 0.0;
+  for (double E = -2e-3; E <= 2e-3; E += 1.7e-5) {
+    const double v = speedOf(servo, 2, E), K = E > 0.0 ? up : down;
+    EXPECT_NEAR(v, orifices(up, down, -3e-4, E), 1e-12) << E;
+    EXPECT_EQ(isLapped(servo, 2, E), v == 0.0) << E;
+    // The way back is steep, not a jump, and exact beyond.
+    const double lap = 6e-4 * (E > 0.0 ? down : up) / (up + down);
+    if (std::abs(v) > K * lap / (kThroughLap - 1.0)) {
+      EXPECT_NEAR(differenceOf(servo, 2, v), E, 1e-12) << E;
+    }
+  }
+  for (double v = -0.05; v <= 0.05; v += 1e-5) {
+    const double E = differenceOf(servo, 2, v), K = v > 0.0 ? up : down;
+    EXPECT_GT(E, last) << v;
+    steepest_way = std::max(steepest_way, std::abs(E / v) * K);
+    last = E;
+  }
+  EXPECT_NEAR(steepest_way, kThroughLap, 1e-9);
+  EXPECT_EQ(differenceOf(servo, 2, 0.0), 0.0);
+  EXPECT_EQ(steepest(servo)(2), std::max(up, down));
+}
+
+TEST(SealFriction, IsFeltWhileATurnIsNew) {
+  ServoModel servo = experiment("z_sine", kCompensated).controller.servo;
+  servo.friction.setConstant(2e-4);
+  servo.friction_time = 0.05;
+  servo.friction_way = 1e-6;
+  // Turned at once from -1 to 1, z_T follows: h = 2 e^{-t/T}, whatever the steps.
+  for (const double dt : {1e-3, 1e-2}) {
+    SealFriction seals;
+    for (int n = 0; n < 1000; ++n) seals.turn(servo, Vec6::Constant(-0.1), dt);
+    double area = 0.0;
+    for (double t = 0.0; t < 0.2 - 1e-9; t += dt) {
+      const Vec6 h = seals.turn(servo, Vec6::Constant(0.1), dt);
+      if (t > 0.0) {
+        EXPECT_NEAR(h(3), 4e-4 * std::exp(-(t + 0.5 * dt) / 0.05), 0.2 * 4e-4 * dt / 0.05) << t;
+      }
+      area += dt * h(3);
+    }
+    EXPECT_NEAR(area, 4e-4 * 0.05 * (1.0 - std::exp(-4.0)), 0.11 * 4e-4 * 0.05) << dt;
+    // At rest the bristles stay bent, and what is felt of it fades.
+    seals.turn(servo, Vec6::Constant(-0.1), dt);
+    const double bent = seals.turn(servo, Vec6::Zero(), dt)(0);
+    EXPECT_NEAR(seals.turn(servo, Vec6::Zero(), dt)(0), bent * std::exp(-dt / 0.05), 0.02 * -bent);
+    seals.settle();
+    EXPECT_EQ(seals.turn(servo, Vec6::Zero(), dt)(0), 0.0);
+    seals.turn(servo, Vec6::Constant(0.1), dt);
+    seals.reset();
+    EXPECT_EQ(seals.turn(servo, Vec6::Zero(), dt)(0), 0.0);
+  }
+  // Over its way as the bristles of LuGre without viscosity.
+  servo.friction_way = 1e-4;
+  servo.friction_time = 1e6;
+  SealFriction seals;
+  double s = 0.0;
+  for (int n = 0; n < 40; ++n, s += 1e-5) {
+    const double h = seals.turn(servo, Vec6::Constant(0.01), 1e-3)(1);
+    EXPECT_NEAR(h, 2e-4 * (1.0 - std::exp(-(s + 0.5e-5) / 1e-4)), 2e-7) << n;
+  }
+}
+
+/// A leg with friction, by Euler's steps so small that they do not matter.
+struct RubbingLeg {
+  const ServoModel& servo;
+  double L = 1.5, v = 0.0, z = 0.0, settled = 0.0;
+  void run(double reference, double T) {
+    constexpr double dt = 2e-6;
+    for (double t = 0.0; t < T - 0.5 * dt; t += dt) {
+      const double E = reference - L - servo.friction(0) * (z - settled);
+      const double v_end = E * (E > 0.0 ? servo.extend(0) : servo.retract(0));
+      settled += dt / servo.friction_time * (z - settled);
+      z += dt * (v - std::abs(v) * z) / servo.friction_way;
+      L += dt * v;
+      v += dt / servo.tau(0) * (v_end - v);
+    }
+  }
+};
+
+TEST(FeedForward, TakesALegThroughItsTurns) {
+  ServoModel servo = experiment("z_sine", kCompensated).controller.servo;
+  servo.readings.scale.setConstant(1e-9);
+  servo.derivative = servo.reading_age = 0.0;
+  servo.delay.setZero();
+  servo.update = 1e-4;
+  servo.friction.setConstant(4e-4);
+  const double T = 0.01, w = 2.0 * M_PI * 0.7, size = 0.01;
+  const auto error = [&](bool believed) {
+    ServoModel belief = servo;
+    if (!believed) belief.friction.setZero();
+    RubbingLeg leg{servo};
+    SealFriction seals;
+    ModelledServos model(belief, T, 0.5);
+    model.reset(Vec6::Constant(1.5), 0);
+    double squares = 0.0, model_off = 0.0;
+    for (int k = 0; k < 600; ++k) {
+      const double t = k * T, grows = std::min(1.0, 0.5 * t);
+      const LegMotion at{Vec6::Constant(1.5 + size * grows * std::sin(w * t)),
+                         Vec6::Constant(size * grows * w * std::cos(w * t)),
+                         Vec6::Constant(-size * grows * w * w * std::sin(w * t))};
+      Vec6 v = at.L_dot + commandDelay(belief, 0, 0.0, T) * at.L_ddot;
+      const Vec6 reference = feedForward(belief, at, 0.0, T, 1.0, seals.turn(belief, v, T));
+      if (k > 300) squares += std::pow(leg.L - at.L(0), 2);
+      leg.run(reference(0), T);
+      model.send(reference, k, k * kTick);
+      model.advance((k + 1) * kTick);
+      if (k > 300) model_off = std::max(model_off, std::abs(model.length()(0) - leg.L));
+    }
+    return std::pair(std::sqrt(squares / 299.0), model_off);
+  };
+  const auto [with, modelled] = error(true);
+  const auto [without, not_modelled] = error(false);
+  EXPECT_LT(with, 0.25 * without) << with << " " << without;
+  EXPECT_LT(modelled, 0.05 * not_modelled) << modelled << " " << not_modelled;
+  EXPECT_GT(not_modelled, 5e-5);
 }
 
 TEST(FeedForward, ShareZeroIsTheReportsReference) {

@@ -1105,6 +1105,21 @@ TEST(ServoIdentification, FindsWhatTheMachineIs) {
     EXPECT_EQ(open.servo.opening, kept.servo.opening);
     EXPECT_EQ(open.deviation.opening, kept.deviation.opening);
     EXPECT_EQ(withRecord(nominal, open).opening, kept.servo.opening);
+    EXPECT_FALSE(open_text.find("friction_m"));
+    EXPECT_TRUE(withRecord(nominal, open).friction.isZero(0.0));
+    kept.servo.opening.setConstant(-1.5e-4);
+    kept.servo.friction << 1e-4, 2e-4, 3e-4, 4e-4, 5e-4, 6e-4;
+    kept.deviation.friction.setConstant(3e-5);
+    kept.servo.friction_time = 0.07;
+    kept.servo.friction_way = 2e-4;
+    const Value rubs_text = parseDocument(write(kept), "servo.yaml");
+    const ServoRecord rubs = readServo(Section(rubs_text, ""));
+    EXPECT_EQ(rubs.deviation.friction, kept.deviation.friction);
+    const ServoModel rubbing = withRecord(nominal, rubs);
+    EXPECT_EQ(rubbing.opening, kept.servo.opening);
+    EXPECT_EQ(rubbing.friction, kept.servo.friction);
+    EXPECT_EQ(rubbing.friction_time, 0.07);
+    EXPECT_EQ(rubbing.friction_way, 2e-4);
     // In place of what the keys say, but for what may be learnt.
     Compensation guessed;
     guessed.gain_error = guessed.timing_error = guessed.mass_error = 0.4;

@@ -69,6 +69,82 @@ TEST(Gate, LooksAtLegsThatHardlyMoveWhereTheirValvesAreOpen) {
   EXPECT_TRUE(stable(-share));
 }
 
+TEST(Gate, LooksAtLegsThatTurnRoundWhereFrictionIsBelievedIn) {
+  Experiment e = test::experiment("puma_on_table_4_1", test::kCompensated);
+  const JointVector& q = e.plant.task.initial_joints;
+  e.controller.servo.friction.setConstant(3e-4);
+  e.controller.servo.friction_way = 1e-4;
+  EXPECT_EQ(directionsOf(e.controller).back(), Direction::kTurning);
+  Loop loop = loopOf(e.controller, q, Direction::kTurning);
+  EXPECT_DOUBLE_EQ(loop.model.turning, 3.0);
+  EXPECT_EQ(loop.model.lapped, 0.0);
+
+  // A turn that is felt for ever, of legs that are told their lengths alone, is a platform that
+  // goes further: the same as a robot that is heavier by that.
+  const auto largest = [](const Loop& l, double least) {
+    std::vector<double> out;
+    for (const auto& root : roots(l))
+      if (std::abs(root - 1.0) > 1e-6 && std::abs(root) > least) out.push_back(std::abs(root));
+    std::sort(out.begin(), out.end());
+    return out;
+  };
+  Loop still = loop;
+  still.model.feed_forward = still.model.inertia = false;
+  still.model.turning = 0.15;
+  still.model.turning_time = 1e300;
+  Loop heavy = still;
+  heavy.model.turning = 0.0;
+  heavy.robot_P = scaledDensity(1.15, heavy.robot_P);
+  const std::vector<double> turns = largest(still, 0.9), weighs = largest(heavy, 0.9);
+  ASSERT_EQ(turns.size(), weighs.size());
+  for (std::size_t i = 0; i < turns.size(); ++i) EXPECT_NEAR(turns[i], weighs[i], 1e-7) << i;
+
+  // One that is over within a tick tells the change since the last: their speed, nearly.
+  const double T = loop.period;
+  Loop quick = loop;
+  quick.model.inertia = false;
+  quick.model.turning = 0.4;
+  quick.model.turning_time = 1e-6;
+  Loop leads = quick;
+  leads.model.turning = 0.0;
+  leads.model.servo.derivative += 0.4 * T;
+  Loop plain = quick;
+  plain.model.turning = 0.0;
+  const double led = radius(leads) - radius(plain);
+  EXPECT_NEAR(radius(quick) - radius(plain), led, 0.1 * std::abs(led));
+  EXPECT_GT(std::abs(led), 1e-6);
+
+  // What overlaps is told to a speed and the lag's share of an acceleration.
+  e.controller.servo.friction.setZero();
+  e.controller.servo.opening.setConstant(-3e-4);
+  EXPECT_EQ(directionsOf(e.controller).back(), Direction::kTurning);
+  Loop lapped = loopOf(e.controller, q, Direction::kTurning);
+  EXPECT_NEAR(lapped.model.lapped, (kThroughLap - 1.0) / lapped.velocity_gain, 1e-12);
+  lapped.model.inertia = false;
+  lapped.model.servo.delay.setConstant(lapped.model.servo.tau(0) + 0.5 * T -
+                                       lapped.model.servo.update);
+  Loop same = lapped;
+  same.model.lapped = 0.0;
+  same.model.servo.derivative += lapped.model.lapped;
+  EXPECT_NEAR(radius(lapped), radius(same), 1e-9);
+
+  // Too much of either is refused as believed, for what it is.
+  const auto verdict = [&](double way) {
+    e.controller.servo.friction.setConstant(3e-3);
+    e.controller.servo.friction_way = way;
+    e.controller.servo.opening.setZero();
+    return assessStability(e.controller, e.plant.task);
+  };
+  EXPECT_TRUE(verdict(1e-2).stable);
+  const LoopVerdict refused = verdict(3e-5);
+  EXPECT_FALSE(refused.as_believed);
+  EXPECT_EQ(refused.direction, Direction::kTurning);
+  EXPECT_NE(explain(refused).find("(legs turning round)"), std::string::npos);
+  EXPECT_NE(explain(refused).find("no friction_m"), std::string::npos) << explain(refused);
+  e.controller.compensation.feed_forward = false;
+  EXPECT_EQ(directionsOf(e.controller).size(), 2u);
+}
+
 TEST(Gate, ItsWorstIsTheWorstOfAllPosesAndBothDirections) {
   // Unfolded in the middle of its program, and back.
   const Experiment folds = test::experiment(

@@ -96,11 +96,13 @@ TEST(ServoAdaptation, FindsWhatTheServosAreOffBy) {
   }
 }
 
-TEST(ServoAdaptation, KnowsValvesThatAreOpenAtNull) {
+class Valves : public testing::TestWithParam<double> {};  // [m] opening
+
+TEST_P(Valves, ServoAdaptationKnowsTheirEdges) {
   // Against servos of the same kind whose gains are off, slow enough to spend half of its time
   // there.
   ServoModel believed = test::experiment("z_sine").controller.servo;
-  believed.opening.setConstant(3e-4);
+  believed.opening.setConstant(GetParam());
   ServoModel truth = believed;
   truth.extend *= 1.05;
   truth.retract *= 0.96;
@@ -121,6 +123,7 @@ TEST(ServoAdaptation, KnowsValvesThatAreOpenAtNull) {
   EXPECT_NEAR(learns.gains().extend(0) / believed.extend(0), 1.05, 0.01);
   EXPECT_NEAR(learns.gains().retract(0) / believed.retract(0), 0.96, 0.01);
 }
+INSTANTIATE_TEST_SUITE_P(OpenAndLapped, Valves, testing::Values(3e-4, -3e-4));
 
 TEST(ServoAdaptation, KnowsTheDerivativeGainAndTheRail) {
   Learning derivative(1.05, 0.96, 0.0, kSettings, 3000);

@@ -168,6 +168,7 @@ LoopVerdict assessStability(const ControllerConfig& controller, const RobotTask&
     double most = 0.0;
     Loop& kept = direction == Direction::kExtending    ? out.extending
                  : direction == Direction::kRetracting ? out.retracting
+                 : direction == Direction::kTurning    ? out.turning
                                                        : out.near_null;
     for (const Loop& loop : loopsOf(controller, task.initial_joints, direction)) {
       for (const CarriedRobot& robot : robots) {
@@ -185,6 +186,7 @@ LoopVerdict assessStability(const ControllerConfig& controller, const RobotTask&
   out.worst = dominantRoot(out.at(out.direction));
   if (out.stable && growth > 0.0 && !isStable(controller, task)) out.stable_for = out.longest;
   if (out.as_believed) return out;
+  out.plain_servos = cured([](Loop& l) { l.model.turning = l.model.lapped = 0.0; });
   out.stable_modes = 0;
   while (out.stable_modes < out.modes &&
          cured([&](Loop& l) { l.base = softest(l.base, out.stable_modes + 1); }))
@@ -241,6 +243,7 @@ std::string explain(const LoopVerdict& v) {
   if (v.stable_modes > 0 && v.stable_modes < v.modes)
     add(fmt::format("keep {} of the {} modes", v.stable_modes, v.modes));
   if (v.damping_ratio > 0.0) add(fmt::format("a damping ratio of {:.2f}", v.damping_ratio));
+  if (v.plain_servos) add("no friction_m, and no opening_m below zero, in the servos' belief");
   if (v.K_P > 0.0) add(fmt::format("{:.0f} percent of K_P", 100.0 * v.K_P));
   if (v.sensor_cutoff > 0.0) {
     std::string one;

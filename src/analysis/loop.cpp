@@ -59,9 +59,10 @@ Lifted liftedOf(const Loop& loop) {
 }
 
 /// The whole loop over a period, of {eta, eta', six channels, six servo models where the inertia is
-/// taken out, six late wrenches a tick of delay, six filtered ones where a low-pass is}. With the
-/// inertia taken out the modes are those of the base with the robot on it. `pushed` adds a column,
-/// last, of a reading of a force along it.
+/// taken out, six late wrenches a tick of delay, six filtered ones where a low-pass is, six places
+/// before they turned where friction is believed in}. With the inertia taken out the modes are
+/// those of the base with the robot on it. `pushed` adds a column, last, of a reading of a force
+/// along it.
 MatrixXd systemOf(const Loop& loop, const Lifted& lifted, const Vec6* pushed = nullptr,
                   RowVectorXd* first_command = nullptr) {
   const Loop::Model& own = loop.model;
@@ -76,8 +77,8 @@ MatrixXd systemOf(const Loop& loop, const Lifted& lifted, const Vec6* pushed = n
   const double T = loop.period;
   const Index channels = 2 * k, models = channels + channel(0).step.rows() + 5 * n,
               late = models + 6 * m, filtered = late + 6 * d,
-              reading = filtered + (loop.passes.isOnes(0.0) ? 0 : 6),
-              size = reading + (pushed ? 1 : 0);
+              turned = filtered + (loop.passes.isOnes(0.0) ? 0 : 6),
+              reading = turned + (own.turning > 0.0 ? 6 : 0), size = reading + (pushed ? 1 : 0);
   const auto startOf = [&](Index i) { return i == 0 ? channels : models - (6 - i) * n; };
   MatrixXd S = MatrixXd::Zero(size, size);
 
@@ -99,7 +100,7 @@ MatrixXd systemOf(const Loop& loop, const Lifted& lifted, const Vec6* pushed = n
     F.setZero();
     F.middleCols(filtered - 6, 6).setIdentity();
   }
-  if (reading > filtered) {
+  if (turned > filtered) {
     F = loop.passes.asDiagonal() * F;
     F.middleCols(filtered, 6).diagonal() = Vec6::Ones() - loop.passes;
     S.middleRows(filtered, 6) = F;
@@ -122,6 +123,14 @@ MatrixXd systemOf(const Loop& loop, const Lifted& lifted, const Vec6* pushed = n
     told = ahead.Phi * S.topRows(2 * k) + ahead.Gamma * u;
   }
   MatrixXd command = Phi * told.topRows(k);
+  MatrixXd beyond = MatrixXd::Zero(6, size);  // of what its own servo model answers
+  if (own.turning > 0.0) {
+    const double kept = std::exp(-T / own.turning_time);
+    S.middleRows(turned, 6) = (1.0 - kept) * command;
+    S.block(turned, turned, 6, 6).diagonal().array() += kept;
+    beyond = own.turning * command;
+    beyond.middleCols(turned, 6).diagonal().array() -= own.turning;
+  }
   if (own.feed_forward) {
     const MatrixXd x_dot = Phi * told.bottomRows(k);
     const MatrixXd x_ddot = Phi * (u - base.stiffness.asDiagonal() * told.topRows(k) -
@@ -131,8 +140,10 @@ MatrixXd systemOf(const Loop& loop, const Lifted& lifted, const Vec6* pushed = n
     acceleration.L_ddot.setOnes();
     command += feedForward(own.servo, rate, T, T, 1.0)(0) * x_dot +
                feedForward(own.servo, acceleration, T, T, 1.0)(0) * x_ddot;
+    beyond += own.lapped * (x_dot + own.servo.tau(0) * x_ddot);
   }
-  command = lifted.axes.transpose() * command;
+  const MatrixXd foreseen = lifted.axes.transpose() * command;
+  command = lifted.axes.transpose() * (command + beyond);
   if (first_command) *first_command = command.row(0);
   for (Index i = 0; i < 6; ++i) {
     const Index at = startOf(i), rows = channel(i).step.rows();
@@ -140,7 +151,7 @@ MatrixXd systemOf(const Loop& loop, const Lifted& lifted, const Vec6* pushed = n
     S.block(at, at, rows, rows) += channel(i).step;
     if (!own.inertia) continue;
     const Index own_at = models + i * m;
-    S.middleRows(own_at, m) = model.from_command * command.row(i);
+    S.middleRows(own_at, m) = model.from_command * foreseen.row(i);
     S.block(own_at, own_at, m, m) += model.step;
     S.col(at + ChannelState::kLength).segment(own_at, m) += model.from_length;
   }
@@ -173,13 +184,18 @@ const char* name(Direction direction) {
     case Direction::kRetracting: return "retracting";
     case Direction::kSwinging: return "swinging";
     case Direction::kNearNull: return "hardly moving";
+    case Direction::kTurning: return "turning round";
   }
   return "";
 }
 
 std::vector<Direction> directionsOf(const ControllerConfig& controller) {
   std::vector<Direction> out = {Direction::kExtending, Direction::kRetracting};
-  if (controller.servo.opening.maxCoeff() > 0.0) out.push_back(Direction::kNearNull);
+  const ServoModel& servo = controller.servo;
+  if (servo.opening.maxCoeff() > 0.0) out.push_back(Direction::kNearNull);
+  if (controller.compensation.feed_forward &&
+      (servo.friction.maxCoeff() > 0.0 || servo.opening.minCoeff() < 0.0))
+    out.push_back(Direction::kTurning);
   return out;
 }
 
@@ -197,7 +213,13 @@ Loop loopOf(const ControllerConfig& controller, const JointVector& q, Direction 
   if (direction == Direction::kExtending) model = up;
   if (direction == Direction::kRetracting) model = down;
   if (direction == Direction::kNearNull) model = up + down;
+  if (direction == Direction::kTurning) {
+    own.turning = own.servo.friction.maxCoeff() / own.servo.friction_way;
+    own.turning_time = own.servo.friction_time;
+    if (own.servo.opening.minCoeff() < 0.0) own.lapped = (kThroughLap - 1.0) / model;
+  }
   own.servo.opening.setZero();  // that is in the gain
+  own.servo.friction.setZero();
   own.setGain(model);
   own.servo.tau.setConstant(own.servo.tau.mean());
   own.servo.delay.setConstant(own.servo.delay.mean());

@@ -24,9 +24,16 @@ constexpr Key<Vec6> kKeys[] = {
     {"tau_s", &ServoModel::tau, 1e-4, 1.0, "of the cylinder"},
     {"delay_s", &ServoModel::delay, -0.01, 0.1, "from a tick to the LegSlave"}};
 
-/// Where valves were found open at null.
-constexpr Key<Vec6> kOpening = {"opening_m", &ServoModel::opening, 0.0, 0.01,
-                                "of both edges at null, as a difference of length"};
+/// Where they were found.
+constexpr Key<Vec6> kFound[] = {
+    {"opening_m", &ServoModel::opening, -0.01, 0.01,
+     "of both edges at null, as a difference of length; below zero: they overlap"},
+    {"friction_m", &ServoModel::friction, 0.0, 0.01,
+     "difference of length that seals take as a leg turns round"}};
+/// With friction.
+constexpr Key<double> kFriction[] = {
+    {"friction_s", &ServoModel::friction_time, 1e-3, 1.0, "for which a turn is felt"},
+    {"friction_way_m", &ServoModel::friction_way, 1e-5, 0.01, "over which it comes"}};
 
 /// Of the force-torque sensor; files of earlier versions have none.
 constexpr Key<double> kSensorKeys[] = {
@@ -47,10 +54,14 @@ std::string write(const ServoRecord& r) {
     line(key.name, r.servo.*key.value, fmt::format("  # {}", key.what));
     line(fmt::format("{}_deviation", key.name), r.deviation.*key.value, "");
   }
-  if (r.servo.opening.maxCoeff() > 0.0) {
-    line(kOpening.name, r.servo.opening, fmt::format("  # {}", kOpening.what));
-    line(fmt::format("{}_deviation", kOpening.name), r.deviation.opening, "");
+  for (const Key<Vec6>& key : kFound) {
+    if ((r.servo.*key.value).isZero(0.0)) continue;
+    line(key.name, r.servo.*key.value, fmt::format("  # {}", key.what));
+    line(fmt::format("{}_deviation", key.name), r.deviation.*key.value, "");
   }
+  if (!r.servo.friction.isZero(0.0))
+    for (const Key<double>& key : kFriction)
+      text += fmt::format("{}: {}  # {}\n", key.name, r.servo.*key.value, key.what);
   for (const Key<double>& key : kSensorKeys)
     if (r.deviation.*key.value > 0.0)
       text += fmt::format("{0}: {1}  # {2}\n{0}_deviation: {3}\n", key.name, r.servo.*key.value,
@@ -65,12 +76,15 @@ ServoRecord readServo(Section s) {
     r.servo.*key.value = s.vector(key.name, kLegs, key.lo, key.hi);
     r.deviation.*key.value = s.vector(fmt::format("{}_deviation", key.name), kLegs, 0.0, 1e3);
   }
-  r.deviation.opening.setZero();
-  if (s.has(kOpening.name)) {
-    r.servo.opening = s.vector(kOpening.name, kLegs, kOpening.lo, kOpening.hi);
-    r.deviation.opening =
-        s.vector(fmt::format("{}_deviation", kOpening.name), kLegs, 0.0, kOpening.hi);
+  for (const Key<Vec6>& key : kFound) {
+    (r.deviation.*key.value).setZero();
+    if (!s.has(key.name)) continue;
+    r.servo.*key.value = s.vector(key.name, kLegs, key.lo, key.hi);
+    r.deviation.*key.value = s.vector(fmt::format("{}_deviation", key.name), kLegs, 0.0, key.hi);
   }
+  if (!r.servo.friction.isZero(0.0))
+    for (const Key<double>& key : kFriction)
+      r.servo.*key.value = s.number(key.name, key.lo, key.hi);
   for (const Key<double>& key : kSensorKeys) {
     r.deviation.*key.value = 0.0;
     if (!s.has(key.name)) continue;
@@ -83,7 +97,8 @@ ServoRecord readServo(Section s) {
 
 ServoModel withRecord(ServoModel nominal, const ServoRecord& record) {
   for (const Key<Vec6>& key : kKeys) nominal.*key.value = record.servo.*key.value;
-  nominal.opening = record.servo.opening;
+  for (const Key<Vec6>& key : kFound) nominal.*key.value = record.servo.*key.value;
+  for (const Key<double>& key : kFriction) nominal.*key.value = record.servo.*key.value;
   for (const Key<double>& key : kSensorKeys) nominal.*key.value = record.servo.*key.value;
   return nominal;
 }

@@ -35,6 +35,7 @@ void LegCommander::hold() noexcept {
   legs_.L_ddot.setZero();
   ahead_ = 0.0;
   reference_ = legs_.L;
+  friction_.settle();
   rounding_residual_.setZero();
   command_.counts = command_.rest;
   command_.ahead = 0;
@@ -55,12 +56,23 @@ Vec6 LegCommander::expected(double share) const noexcept {
   return legs_.L + share * (period_ - ahead_) * legs_.L_dot;
 }
 
+/// [m] of E that friction takes while this command is held.
+Vec6 LegCommander::rubbing(const ServoModel& servo, const LegMotion& legs, double ahead) noexcept {
+  if (servo.friction.isZero(0.0)) return Vec6::Zero();
+  Vec6 v;
+  for (int i = 0; i < kLegs; ++i)
+    v(i) = legs.L_dot(i) + commandDelay(servo, i, ahead, period_) * legs.L_ddot(i);
+  return friction_.turn(servo, v, period_);
+}
+
 /// The legs' lengths, or what takes the legs there; inside the limits in any case.
 Vec6 LegCommander::referenceOf(const LegMotion& legs, double ahead, double share,
-                               const ServoObserver& servo, double age) const noexcept {
+                               const ServoObserver& servo, double age) noexcept {
   if (!compensation_.any()) return legs.L;
   Vec6 L = legs.L;
-  if (compensation_.feed_forward) L = feedForward(servo.model(), legs, ahead, period_, share);
+  if (compensation_.feed_forward)
+    L = feedForward(servo.model(), legs, ahead, period_, share,
+                    rubbing(servo.model(), legs, ahead));
   if (compensation_.observer) L += share * servo.rounding(legs.L_dot, age);
   return L.cwiseMax(leg_min_).cwiseMin(leg_max_);
 }

@@ -8,6 +8,7 @@ namespace ves {
 
 ModelledServos::ModelledServos(const ServoModel& servo, double period, double phase)
     : servo_(servo),
+      rubs_(!servo.friction.isZero(0.0)),
       period_(std::llround(period * 1e9)),
       first_update_(phase * servo.update),
       whole_(passage(servo.update)) {
@@ -23,6 +24,7 @@ void ModelledServos::reset(const Vec6& L, std::int64_t time) noexcept {
   v_.setZero();
   v_end_.setZero();
   E_.setZero();
+  friction_.reset();
   now_ = time;
   to_update_ = first_update_;
   sent_ = 0;
@@ -74,6 +76,7 @@ void ModelledServos::update() noexcept {
     E_(leg) = command->reference(leg);
   }
   E_ -= reading(L_, v_) + servo_.derivative * v_;
+  if (rubs_) E_ -= friction_.turn(servo_, v_, servo_.update);
   E_ = E_.cwiseMin(servo_.rail).cwiseMax(-servo_.rail);
   v_end_ = speedsOf(servo_, E_);
 }

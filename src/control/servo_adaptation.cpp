@@ -45,6 +45,10 @@ void ServoAdaptation::update() noexcept {
   const ServoModel& servo = believed_.model();
   const Vec6& E = believed_.difference();
   for (int i = 0; i < kLegs; ++i) {
+    if (isLapped(servo, i, E(i))) {
+      extend_.v_end(i) = retract_.v_end(i) = 0.0;
+      continue;
+    }
     const bool extends = E(i) > 0.0, null = nearNull(servo, i, E(i));
     const double up = servo.extend(i), down = servo.retract(i),
                  K = null      ? up + down

@@ -205,11 +205,10 @@ Commissioned commissioned(const Series& series, const Commissioning& commissioni
     out.no_masses = commissioning.no_plan;
   }
   try {
-    // Slow moves tell how far valves are open at null; the gains where they are not, fast ones.
+    // Slow moves tell how far valves are open at null, and how seals rub; else fast ones the gains.
     const ServoEstimate legs = identifiedLegs(movesIn(series));
-    out.servo =
-        identifiedServo(shakesIn(series, out),
-                        legs.servo.opening.isZero(0.0) ? std::optional<ServoEstimate>() : legs);
+    out.servo = identifiedServo(shakesIn(series, out),
+                                legs.plain() ? std::optional<ServoEstimate>() : legs);
   } catch (const std::domain_error& why) {
     out.no_servo = why.what();
   }
@@ -262,7 +261,10 @@ std::optional<ErrorForecast> forecastError(const Experiment& scenario, const Exp
          "machine.switches=simulated",
          "controller.stability=forced"});  // whether it may is said beside it
     e.plant.payload = m.payload;
-    if (!e.plant.hydraulic) e.controller.servo.opening.setZero();  // ideal valves just close
+    if (!e.plant.hydraulic) {  // ideal valves just close, and nothing rubs
+      e.controller.servo.opening.setZero();
+      e.controller.servo.friction.setZero();
+    }
     const RecordedRun run = recordLockstep(e);
     const auto summary = summarise(run.series, run.result);
     if (!summary.contains("emulation_error_position_share")) return {};

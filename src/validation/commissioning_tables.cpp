@@ -88,11 +88,14 @@ std::vector<Table> tablesOf(const Series& series, const Commissioning& commissio
       servo.rows.push_back({fmt::format("{}", i + 1), cell(&ServoModel::extend, i, 1.0),
                             cell(&ServoModel::retract, i, 1.0), cell(&ServoModel::tau, i, 1e3),
                             cell(&ServoModel::delay, i, 1e3)});
-    if (!f.servo->legs.servo.opening.isZero(0.0)) {
-      servo.header.push_back("valve open at null [um]");
+    const auto found = [&](Vec6 ServoModel::*value, const char* name) {
+      if ((f.servo->legs.servo.*value).isZero(0.0)) return;
+      servo.header.push_back(name);
       for (int i = 0; i < kLegs; ++i)
-        servo.rows[static_cast<std::size_t>(i)].push_back(cell(&ServoModel::opening, i, 1e6));
-    }
+        servo.rows[static_cast<std::size_t>(i)].push_back(cell(value, i, 1e6));
+    };
+    found(&ServoModel::opening, "open at null [um]");
+    found(&ServoModel::friction, "seals take [um]");
     const auto& sensor = f.servo->sensor;
     servo.note = sensor ? fmt::format(
                               "The wrench comes {:.0f} +- {:.0f} us later than the servos "

@@ -25,16 +25,18 @@ struct LoopVerdict {
   DominantRoot at_off;           // and what grows there
   DominantRoot worst;
   Direction direction = Direction::kExtending;
-  Loop extending, retracting, near_null;  // in the pose where each is worst
+  Loop extending, retracting, near_null, turning;  // in the pose where each is worst
   const Loop& at(Direction which) const {
     return which == Direction::kExtending    ? extending
            : which == Direction::kRetracting ? retracting
+           : which == Direction::kTurning    ? turning
                                              : near_null;
   }
-  int modes = 0;             // [-] kept
-  int stable_modes = 0;      // [-] that could be
-  double damping_ratio = 0;  // [-] that every mode would need; 0: none up to 1 helps
-  double K_P = 0;            // [-] share of K_P that would do; 0: none from 1/8 to 1
+  int modes = 0;              // [-] kept
+  int stable_modes = 0;       // [-] that could be
+  double damping_ratio = 0;   // [-] that every mode would need; 0: none up to 1 helps
+  double K_P = 0;             // [-] share of K_P that would do; 0: none from 1/8 to 1
+  bool plain_servos = false;  // a belief without friction and overlap would do
   // Where the machine gives way, what lets its swing no longer into the wrench, and out of the oil.
   double sensor_cutoff = 0.0;  // [rad/s] of the sensor's filter that would do; 0: none
   double feedback = 0.0;       // [1/s] of the pressure, with the sensor's filter as it is or so

@@ -65,6 +65,10 @@ struct Loop {
     bool feed_forward = false, inertia = false;
     RigidBody robot_P;
     ServoModel servo;  // all legs alike, one gain for both directions, no rail
+    // Of feed-forward for legs that turn round, by friction and overlap that are not there.
+    double turning = 0.0;       // [-] of a way within which a leg turns,
+    double turning_time = 1.0;  // [s] while it is new
+    double lapped = 0.0;        // [s] of its speed
 
     Mat6 M_1() const { return servo.sensor_scale * spatialMass(robot_P); }
     double gain() const { return servo.extend(0); }  // [1/s]
@@ -86,11 +90,13 @@ struct Uncertainty {
 Loop off(Loop loop, const Uncertainty& by, int timing, int gain);
 
 /// The gain of a leg depends on which way it moves. A leg that swings has the harmonic mean, as
-/// long as its speed is nearly a sine. Near null both edges of valves that are open there pass.
-enum class Direction { kExtending, kRetracting, kSwinging, kNearNull };
+/// long as its speed is nearly a sine. Near null both edges of valves that are open there pass. A
+/// leg that turns round is told more than goes that way, where friction or overlap is believed in:
+/// the loop is judged as if neither were there.
+enum class Direction { kExtending, kRetracting, kSwinging, kNearNull, kTurning };
 const char* name(Direction direction);
 
-/// Those for which a loop is judged: both ways, and near null where that is another gain.
+/// Those for which a loop is judged: both ways, and hardly moving where that is another loop.
 std::vector<Direction> directionsOf(const ControllerConfig& controller);
 
 /// The loop as the controller believes it: servos and sensor by its servo model, the robot by its

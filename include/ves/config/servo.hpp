@@ -13,8 +13,9 @@ namespace ves {
 
 struct ServoRecord {
   std::int64_t date = 0;  // [s] since 1970, UTC
-  ServoModel servo;       // extend, retract, tau, delay, opening; of the sensor, delay and scale
-  ServoModel deviation;   // standard, of the same
+  // Extend, retract, tau, delay, opening, friction; of the sensor, delay and scale.
+  ServoModel servo;
+  ServoModel deviation;  // standard, of the same
 };
 
 /// YAML, as readServo() takes it.

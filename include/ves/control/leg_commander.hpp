@@ -65,7 +65,8 @@ class LegCommander {
 
  private:
   Vec6 referenceOf(const LegMotion& legs, double ahead, double share, const ServoObserver& servo,
-                   double age) const noexcept;
+                   double age) noexcept;
+  Vec6 rubbing(const ServoModel& servo, const LegMotion& legs, double ahead) noexcept;
 
   LegCodec codec_;
   Compensation compensation_;
@@ -75,6 +76,7 @@ class LegCommander {
   LegMotion legs_;
   double ahead_ = 0.0;  // [s] of the last command's lengths after its tick
   Vec6 reference_ = Vec6::Zero();
+  SealFriction friction_;                  // of the legs as commanded
   Vec6 rounding_residual_ = Vec6::Zero();  // [m] of the commands so far
 };
 

@@ -77,6 +77,8 @@ class ModelledServos {
   static constexpr std::size_t kCommands = kMostDelay + 4;
 
   ServoModel servo_;
+  bool rubs_;  // friction is believed in
+  SealFriction friction_;
   std::array<std::int64_t, kLegs> delay_;  // [ns] of it
   std::int64_t period_;                    // [ns] of the controller
   double first_update_;                    // [s] from a reset to the first
