@@ -79,6 +79,7 @@ TEST(Gate, LooksAtLegsThatTurnRoundWhereFrictionIsBelievedIn) {
   EXPECT_DOUBLE_EQ(loop.model.turning, 3.0);
   EXPECT_EQ(loop.model.lapped, 0.0);
 
+  const double T = loop.period;
   // A turn that is felt for ever, of legs that are told their lengths alone, is a platform that
   // goes further: the same as a robot that is heavier by that.
   const auto largest = [](const Loop& l, double least) {
@@ -99,8 +100,15 @@ TEST(Gate, LooksAtLegsThatTurnRoundWhereFrictionIsBelievedIn) {
   ASSERT_EQ(turns.size(), weighs.size());
   for (std::size_t i = 0; i < turns.size(); ++i) EXPECT_NEAR(turns[i], weighs[i], 1e-7) << i;
 
+  // It is felt for its time, whatever else there is.
+  Loop fades = loop;
+  fades.robot_P = fades.model.robot_P = RigidBody();
+  fades.model.turning_time = 0.05;
+  int fading = 0;
+  for (const auto& root : roots(fades)) fading += std::abs(root - std::exp(-T / 0.05)) < 1e-4;
+  EXPECT_EQ(fading, 6);
+
   // One that is over within a tick tells the change since the last: their speed, nearly.
-  const double T = loop.period;
   Loop quick = loop;
   quick.model.inertia = false;
   quick.model.turning = 0.4;

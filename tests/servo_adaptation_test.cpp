@@ -123,7 +123,7 @@ TEST_P(Valves, ServoAdaptationKnowsTheirEdges) {
   EXPECT_NEAR(learns.gains().extend(0) / believed.extend(0), 1.05, 0.01);
   EXPECT_NEAR(learns.gains().retract(0) / believed.retract(0), 0.96, 0.01);
 }
-INSTANTIATE_TEST_SUITE_P(OpenAndLapped, Valves, testing::Values(3e-4, -3e-4));
+INSTANTIATE_TEST_SUITE_P(OpenAndLapped, Valves, testing::Values(3e-4, -3e-4, -1e-3));
 
 TEST(ServoAdaptation, KnowsTheDerivativeGainAndTheRail) {
   Learning derivative(1.05, 0.96, 0.0, kSettings, 3000);

@@ -61,7 +61,7 @@ void JointMomentum::reset(const JointVector& q) noexcept {
   begun_ = false;
   q_ = q;
   shown_q_dot_.setZero();
-  I_.force = E_.force = {};
+  I_ = E_ = {};
 }
 
 JointVector JointMomentum::at(const Sample& sample) const noexcept {

@@ -70,7 +70,7 @@ Vec6 SealFriction::turn(const ServoModel& servo, const Vec6& v, double dt) noexc
                  z = end + (z_ - end) * (x > kNone).select((1.0 - kept) / x, 1.0),
                  settled = settled_;
   settled_ += (1.0 - std::exp(-dt / servo.friction_time)) * (z - settled_);
-  z_ = (x > kNone).select(end + (z_ - end) * kept, z_);
+  z_ = end + (z_ - end) * kept;
   return servo.friction.cwiseProduct((z - 0.5 * (settled + settled_)).matrix());
 }
 
