@@ -271,28 +271,30 @@ INSTANTIATE_TEST_SUITE_P(Kinds, ResetVehicle,
                                          "satellite_tumbling", "ship_arm", "deck_puma"),
                          [](const auto& test) { return std::string(test.param); });
 
+/// What knows of the robot by two parameters.
+Lesson lessonOf(Use& use) {
+  Lesson out;
+  out.momentum = MassColumns::Zero(6, 2);
+  out.momentum.col(0) = use.vec(1.0);
+  out.momentum.col(1) = use.vec(1.0);
+  return out;
+}
+
 TEST(ResetIsAsNew, Hindsight) {
   struct Learner {
     Hindsight hindsight;
     AdmittanceModel base;
   };
   const AdmittanceModel base(experiment("puma_on_table_4_1").controller.vehicle, 0.01);
-  const auto lesson = [](Use& use) {
-    Lesson out;
-    out.momentum = MassColumns::Zero(6, 2);
-    out.momentum.col(0) = use.vec(1.0);
-    out.momentum.col(1) = use.vec(1.0);
-    return out;
-  };
   expectAsNew(
       Learner{Hindsight(0.01), base},
       [&](Learner& one) {
         Use use(11);
         one.base.reset(Vec6::Zero());
-        one.hindsight.reset(one.base, lesson(use));
+        one.hindsight.reset(one.base, lessonOf(use));
       },
       [&](Learner& one, Use& use, int n) {
-        Lesson now = lesson(use);
+        Lesson now = lessonOf(use);
         now.withheld = use.wrench(10.0);
         now.passed = use.wrench(10.0);
         now.passing = n % 3 != 0;
@@ -309,6 +311,59 @@ TEST(ResetIsAsNew, Hindsight) {
         use.say(one.hindsight.any() ? 1.0 : 0.0);
       });
 }
+
+class ResetControl : public testing::TestWithParam<const char*> {};
+
+TEST_P(ResetControl, IsAsNew) {
+  std::vector<std::string> set = kCompensated;
+  for (const char* more : {"controller.compensation.wrench=aided",
+                           "controller.passivity.enabled=true", "controller.passivity.reserve_j=0"})
+    set.push_back(more);
+  const ControllerConfig config = experiment(GetParam(), set).controller;
+  const Geometry& g = config.geometry;
+  struct Emulation {
+    AdmittanceControl control;
+    ServoObserver servo;
+    PathPoint<6> last;
+  };
+  Mat6 M_1 = 20.0 * Mat6::Identity();
+  M_1.bottomRightCorner<3, 3>() *= 0.2;
+  const PathChecks checks(config.safety, g);
+  expectAsNew(
+      Emulation{AdmittanceControl(config), ServoObserver(config.servo, 0.01), PathPoint<6>()},
+      [&](Emulation& one) {
+        one.control.end();
+        one.control.begin(Vec6::Zero(), M_1, 0.004, 1.0);
+        one.servo.reset(legLengths(g, g.fromHome({})), 0);
+        one.last = PathPoint<6>();
+      },
+      [&](Emulation& one, Use& use, int n) {
+        const Vec6 L = legLengths(g, g.fromHome(Pose::from(one.last.x)));
+        one.servo.send(L, n, n * kTick);
+        one.servo.advance((n + 1) * kTick);
+        const Wrench felt = use.wrench(20.0), at_port = use.wrench(20.0);
+        const Mat6 noise = 1e-3 * Mat6::Identity();
+        Lesson lesson = lessonOf(use);
+        lesson.withheld = use.wrench(1.0);
+        lesson.group_ends = n % Lesson::kGroup == Lesson::kGroup - 1;
+        if (lesson.group_ends && n > 20) lesson.replay = 2 * Lesson::kGroup;
+        const WrenchTiming timing{n == 0 ? 0.03 : 0.01, 0.004, (n + 1) * kTick};
+        const CarriedBody body(M_1);
+        const JointVector q = JointVector::Zero();
+        const Transform X_IP = g.fromHome(Pose::from(one.last.x));
+        one.last = one.control.step(
+            {felt, at_port, noise, body, 1.0, timing, false, lesson, q, L, X_IP, one.servo},
+            one.last, checks);
+        use.say(one.last.x);
+        use.say(one.last.x_dot);
+        use.say(one.last.x_ddot);
+        use.say(one.control.energy().putIn());
+        use.say(one.control.energy().damping());
+      });
+}
+INSTANTIATE_TEST_SUITE_P(Vehicles, ResetControl,
+                         testing::Values("puma_on_table_4_1", "srms_capture_doss", "ship_arm"),
+                         [](const auto& test) { return std::string(test.param); });
 
 TEST(ResetIsAsNew, JointMomentum) {
   std::vector<std::string> aided = kCompensated;
