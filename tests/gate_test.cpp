@@ -534,6 +534,12 @@ TEST(Gate, LooksAtTheMassesThatMayBeLearnt) {
     e.controller.compensation.hand_mass = 1e3;
     e.controller.hand.link = 5;
     EXPECT_FALSE(admitted(0.0));
+    const LoopVerdict hand = assessStability(e.controller, e.plant.task);
+    const std::string knows =
+        fmt::format("and {:.3g} kg in the robot's hand that {}: ", 3e3,
+                    hand.off[2] > 0 ? "nobody knows of" : "are believed and not there");
+    EXPECT_NE(explain(hand).find(knows), std::string::npos) << explain(hand);
+    EXPECT_NE(explain(hand).find("hand_mass_kg"), std::string::npos);
     e.controller.hand = {};
     EXPECT_TRUE(admitted(0.0));
     e.controller.compensation.learns_masses = false;

@@ -239,6 +239,13 @@ TEST_P(ResetVehicle, IsAsNew) {
         AdmittanceModel(config.vehicle, 0.01),
         [&](AdmittanceModel& model) { model.reset(Vec6::Constant(0.01), M_1, ahead); },
         [&](AdmittanceModel& model, Use& use, int n) {
+          const Thrust thrust = model.thrust();
+          use.say(thrust.time);
+          use.say(thrust.left);
+          use.say(thrust.on);
+          use.say(model.coasting());
+          use.say(model.kineticEnergy());
+          if (n == 30) model.countFrom(use.vec(0.1));
           CarriedBody body(M_1, Mat6((1.0 + 0.01 * n) * M_1));
           body.joints = use.vec(0.5);
           body.mass = 20.0;
@@ -268,15 +275,15 @@ TEST_P(ResetVehicle, IsAsNew) {
 }
 INSTANTIATE_TEST_SUITE_P(Kinds, ResetVehicle,
                          testing::Values("puma_on_table_4_1", "srms_capture_doss", "satellite_hold",
-                                         "satellite_tumbling", "ship_arm", "deck_puma"),
+                                         "satellite_jets", "satellite_tumbling", "ship_arm",
+                                         "deck_puma"),
                          [](const auto& test) { return std::string(test.param); });
 
-/// What knows of the robot by two parameters.
+/// What knows of the robot by two parameters, and by four of what it may have in hand.
 Lesson lessonOf(Use& use) {
   Lesson out;
-  out.momentum = MassColumns::Zero(6, 2);
-  out.momentum.col(0) = use.vec(1.0);
-  out.momentum.col(1) = use.vec(1.0);
+  out.momentum = MassColumns::Zero(6, 6);
+  for (Eigen::Index i = 0; i < 6; ++i) out.momentum.col(i) = use.vec(1.0);
   return out;
 }
 
@@ -300,9 +307,12 @@ TEST(ResetIsAsNew, Hindsight) {
         now.passing = n % 3 != 0;
         now.group_ends = n % Lesson::kGroup == Lesson::kGroup - 1;
         if (now.group_ends && n > 20) now.replay = 2 * Lesson::kGroup;
+        if (n % 29 == 2) {
+          now.hand = 2;
+          now.was_weight = true;
+        }
         if (n % 13 == 12) {
-          now.learnt = MassVector::Zero(2);
-          now.learnt << use.in(-0.1, 0.1), use.in(-0.1, 0.1);
+          now.learnt = use.vec(0.1);
         }
         one.base.step(use.wrench(20.0), Mat6(Mat6::Zero()), 0.01, 0.0);
         one.hindsight.step(one.base, Mat6::Zero(), 0.01, now);
@@ -319,7 +329,11 @@ TEST_P(ResetControl, IsAsNew) {
   for (const char* more : {"controller.compensation.wrench=aided",
                            "controller.passivity.enabled=true", "controller.passivity.reserve_j=0"})
     set.push_back(more);
-  const ControllerConfig config = experiment(GetParam(), set).controller;
+  ControllerConfig config = experiment(GetParam(), set).controller;
+  config.safety.window = 0.04;  // so short that energy may grow for many of them
+  config.safety.growth_floor = 1e-12;
+  config.safety.window_growth = 1.0;
+  config.safety.growing_windows = 6;
   const Geometry& g = config.geometry;
   struct Emulation {
     AdmittanceControl control;
@@ -341,7 +355,7 @@ TEST_P(ResetControl, IsAsNew) {
         const Vec6 L = legLengths(g, g.fromHome(Pose::from(one.last.x)));
         one.servo.send(L, n, n * kTick);
         one.servo.advance((n + 1) * kTick);
-        const Wrench felt = use.wrench(20.0), at_port = use.wrench(20.0);
+        const Wrench felt = use.wrench(0.1 * std::exp(0.1 * n)), at_port = use.wrench(20.0);
         const Mat6 noise = 1e-3 * Mat6::Identity();
         Lesson lesson = lessonOf(use);
         lesson.withheld = use.wrench(1.0);
@@ -359,15 +373,19 @@ TEST_P(ResetControl, IsAsNew) {
         use.say(one.last.x_ddot);
         use.say(one.control.energy().putIn());
         use.say(one.control.energy().damping());
+        use.say(one.control.oscillation().good(config.safety) ? 1.0 : 0.0);
       });
 }
 INSTANTIATE_TEST_SUITE_P(Vehicles, ResetControl,
                          testing::Values("puma_on_table_4_1", "srms_capture_doss", "ship_arm"),
                          [](const auto& test) { return std::string(test.param); });
 
-TEST(ResetIsAsNew, JointMomentum) {
+class ResetJoints : public testing::TestWithParam<const char*> {};
+
+TEST_P(ResetJoints, IsAsNew) {
   std::vector<std::string> aided = kCompensated;
   aided.push_back("controller.compensation.wrench=aided");
+  aided.push_back(GetParam());
   ControllerConfig config = experiment("srms_capture_doss", aided).controller;
   config.servo.sensor_delay = 0.002;
   const KnownPayload known(config);
@@ -388,6 +406,10 @@ TEST(ResetIsAsNew, JointMomentum) {
         use.say(joints.at(s));
       });
 }
+
+INSTANTIATE_TEST_SUITE_P(Encoders, ResetJoints,
+                         testing::Values("seed=1", "robot.encoders={counts_per_turn: 4096}"),
+                         [](const auto& test) { return test.index == 0 ? "exact" : "counts"; });
 
 TEST(ResetIsAsNew, MovingFrame) {
   const ControllerConfig config = experiment("satellite_tumbling").controller;
@@ -460,12 +482,10 @@ TEST(ResetIsAsNew, ATare) {
 }
 
 TEST(ResetIsAsNew, ASensorThatSettles) {
-  plant::ForceTorqueSensorModel model = experiment("z_sine").plant.sensor;
-  const plant::ForceTorqueSensor sensor(model, plant::Noise(1));
+  const auto model = experiment("z_sine", {"sensor.noise=false"}).plant.sensor;
   expectAsNew(
-      sensor,
-      [&](plant::ForceTorqueSensor& one) {
-        one = sensor;  // with the same noise
+      plant::ForceTorqueSensor(model, plant::Noise(1)),
+      [](plant::ForceTorqueSensor& one) {
         one.settle(Wrench{{1.0, 2.0, 3.0}, {4.0, 5.0, 6.0}});
       },
       [](plant::ForceTorqueSensor& one, Use& use, int) {

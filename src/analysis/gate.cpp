@@ -75,17 +75,18 @@ Uncertainty uncertaintyOf(const Compensation& c) {
 }
 
 /// Robots that are heavier (1) or lighter (-1) than is believed: all of their bodies, or by what is
-/// in the hand.
-std::vector<CarriedRobot> mistaken(const std::vector<ProgramRobot>& robots, const Uncertainty& by,
+/// in the hand, whose mass is beside it.
+std::vector<ProgramRobot> mistaken(const std::vector<ProgramRobot>& robots, const Uncertainty& by,
                                    int mass) {
   const double times = mass > 0 ? 1.0 + by.heavier : 1.0 - by.lighter;
-  std::vector<CarriedRobot> out;
+  std::vector<ProgramRobot> out;
   for (const ProgramRobot& one : robots) {
-    out.push_back(one.body);
-    out.back().robot_P = scaledDensity(times, one.body.robot_P);
+    out.push_back(one);
+    out.back().in_hand = RigidBody();
+    out.back().body.robot_P = scaledDensity(times, one.body.robot_P);
     if (!(one.in_hand.mass > 0.0)) continue;
-    out.push_back(one.body);
-    RigidBody& holds = mass > 0 ? out.back().robot_P : out.back().known_P;
+    out.push_back(one);
+    RigidBody& holds = mass > 0 ? out.back().body.robot_P : out.back().body.known_P;
     holds = combine(holds, {}, one.in_hand);
   }
   return out;
@@ -98,8 +99,8 @@ std::optional<std::array<int, 3>> cornerThatGrows(const ControllerConfig& contro
   const Compensation& c = controller.compensation;
   if (!c.inertia) return {};
   const Uncertainty by = uncertaintyOf(c);
-  const std::vector<CarriedRobot> heavy = mistaken(robots, by, 1);
-  std::vector<CarriedRobot> both = mistaken(robots, by, -1);
+  const std::vector<CarriedRobot> heavy = bodies(mistaken(robots, by, 1));
+  std::vector<CarriedRobot> both = bodies(mistaken(robots, by, -1));
   both.insert(both.end(), heavy.begin(), heavy.end());
   for (const int gain : {1, -1})
     for (const int timing : {1, -1}) {
@@ -157,10 +158,12 @@ LoopVerdict assessStability(const ControllerConfig& controller, const RobotTask&
       const auto& [timing, gain, mass] = out.off;
       for (const Direction direction : directionsOf(controller))
         for (const Loop& loop : loopsOf(controller, task.initial_joints, direction))
-          for (const CarriedRobot& robot : mistaken(program, out.uncertainty, mass)) {
+          for (const ProgramRobot& robot : mistaken(program, out.uncertainty, mass)) {
             const DominantRoot root =
-                dominantRoot(off(carrying(loop, robot), out.uncertainty, timing, gain));
-            if (root.radius > out.at_off.radius) out.at_off = root;
+                dominantRoot(off(carrying(loop, robot.body), out.uncertainty, timing, gain));
+            if (root.radius <= out.at_off.radius) continue;
+            out.at_off = root;
+            out.hand = robot.in_hand.mass;
           }
     }
   double largest = 0.0;
@@ -226,16 +229,23 @@ std::string explain(const DominantRoot& root, double longest) {
 }
 
 std::string explain(const LoopVerdict& v) {
-  if (v.as_believed)
+  if (v.as_believed) {
+    const bool heavy = v.off[2] > 0, hand = v.hand > 0.0;
+    const std::string robot =
+        hand ? fmt::format("{:.3g} kg in the robot's hand that {}", v.hand,
+                           heavy ? "nobody knows of" : "are believed and not there")
+             : fmt::format("a robot {:.3g} % {}",
+                           100.0 * (heavy ? v.uncertainty.heavier : v.uncertainty.lighter),
+                           heavy ? "heavier" : "lighter");
     return fmt::format(
         "the loop of base, robot and machine would decay as believed, but diverge with a wrench "
-        "{:.3g} ms {}, servos {:.3g} % {} and a robot {:.3g} % {}: {}. What cures it: better "
-        "beliefs (timing_error_s, gain_error and mass_error of controller.compensation), a lighter "
-        "robot or a heavier base",
+        "{:.3g} ms {}, servos {:.3g} % {} and {}: {}. What cures it: better beliefs "
+        "(timing_error_s, gain_error and {} of controller.compensation), a lighter robot or a "
+        "heavier base",
         1e3 * v.uncertainty.timing, v.off[0] > 0 ? "later" : "earlier", 100.0 * v.uncertainty.gain,
-        v.off[1] > 0 ? "quicker" : "slower",
-        100.0 * (v.off[2] > 0 ? v.uncertainty.heavier : v.uncertainty.lighter),
-        v.off[2] > 0 ? "heavier" : "lighter", explain(v.at_off, v.longest));
+        v.off[1] > 0 ? "quicker" : "slower", robot, explain(v.at_off, v.longest),
+        hand ? "hand_mass_kg" : "mass_error");
+  }
   Eigen::Index i = 0;
   v.worst.shape.cwiseAbs().maxCoeff(&i);
   std::string cure;

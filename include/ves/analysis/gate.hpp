@@ -22,6 +22,7 @@ struct LoopVerdict {
   bool as_believed = true;       // it would be, were the belief exact
   Uncertainty uncertainty;       // that it is judged for,
   std::array<int, 3> off{};      // [-] and where not: timing, gain and mass, -1 or 1,
+  double hand = 0.0;             // [kg] in its hand and not known of, or known of and not there
   DominantRoot at_off;           // and what grows there
   DominantRoot worst;
   Direction direction = Direction::kExtending;
