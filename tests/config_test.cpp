@@ -774,7 +774,6 @@ TEST(Config, AnExcitationIsFiveMoves) {
   EXPECT_TRUE(program.segments[5].target.stacked().isZero(0.0));
 }
 
-// Of more moves than a program holds, none is lost in silence.
 TEST(Config, HydraulicLegsThatCannotBeAreRefused) {
   const auto said = [](std::vector<std::string> set) {
     set.push_back("legs.model=hydraulic");
@@ -794,6 +793,21 @@ TEST(Config, HydraulicLegsThatCannotBeAreRefused) {
     EXPECT_NE(said(set).find(part), std::string::npos) << said(set);
     EXPECT_EQ(said(set).find('\n'), std::string::npos) << said(set);
   }
+}
+
+TEST(Config, SubstitutesOfLegsThatAreNotThereAreNotCounted) {
+  const std::string text = test::readText(test::configDir() + "/ves.yaml");
+  const std::size_t begin = text.find("\n  hydraulic:"), end = text.find("\n  watchdog:");
+  ASSERT_LT(begin, end);
+  int tagged = 0;  // numbers
+  for (std::size_t at = begin; (at = text.find("!substitute", at + 1)) < end;) {
+    const std::string value = text.substr(at, text.find_first_of("#\n", at) - at);
+    tagged += 1 + static_cast<int>(std::count(value.begin(), value.end(), ','));  // of a vector
+  }
+  EXPECT_GT(tagged, 20);
+  EXPECT_EQ(test::experiment("z_sine", {"legs.model=hydraulic"}).source.substitutes -
+                test::experiment("z_sine").source.substitutes,
+            tagged);
 }
 
 TEST(Config, FaultsOfCylindersAreOfHydraulicLegs) {
@@ -846,6 +860,7 @@ TEST(Config, WhatGivesWayIsToldOrFollowsFromTheSimulatedLegs) {
         << unused;
 }
 
+// Of more moves than a program holds, none is lost in silence.
 TEST(Config, ExcitationsThatFillAProgramAreRefused) {
   std::string program;
   for (int i = 0; i < kMaxSegments / 5 + 1; ++i)
