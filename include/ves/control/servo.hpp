@@ -16,7 +16,7 @@
 // `opening` below zero, nothing passes for small E, and beyond K (E - what overlaps).
 //
 // Seals that rub press the oil the other way once a leg turns round. While that is new, the oil
-// gives way and a pressure feedback closes the valve, by an E of `friction` at most:
+// gives way and a pressure feedback closes the valve, by an E of twice `friction` at first:
 //
 //   E = r - L(t - a) - d v - friction (z - z_T),  z' = |v|/way (sign v - z),  T z_T' = z - z_T
 #pragma once
@@ -51,7 +51,8 @@ struct ServoModel {
   double jitter = 0.0;           // [s] by which the time of a reading may be wrong
 };
 
-/// [m/s] v_end of leg i for E [m], and E for v_end: the same curve, which rises all the way.
+/// [m/s] v_end of leg i for E [m], and E for v_end: the same curve, but for an overlap, which is
+/// crossed on a slope.
 double speedOf(const ServoModel& servo, int i, double E) noexcept;
 Vec6 speedsOf(const ServoModel& servo, const Vec6& E) noexcept;
 double differenceOf(const ServoModel& servo, int i, double v_end) noexcept;
@@ -60,7 +61,7 @@ Vec6 steepest(const ServoModel& servo) noexcept;
 /// True where both edges of leg i's valve pass, and where neither does.
 bool nearNull(const ServoModel& servo, int i, double E) noexcept;
 bool isLapped(const ServoModel& servo, int i, double E) noexcept;
-/// [-] times 1/K that differenceOf() rises with v_end at most, where it has an overlap to pass.
+/// [-] times 1/K: that slope.
 inline constexpr double kThroughLap = 2.0;
 
 /// What the seals of six legs do to their valves.
