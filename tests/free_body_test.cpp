@@ -735,5 +735,60 @@ TEST(Thrusters, KeepTheModelWhereTheyKeepTheTruth) {
   EXPECT_LT(apart, 1e-4);
 }
 
+// It is slowed along the shortest turn, which is not where the fixed angles go straight.
+TEST(FreeBody, IsSlowedToWhereEveryCheckPasses) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> u(-1.0, 1.0);
+  int slowed = 0;
+  for (const char* scenario : {"satellite_puma", "satellite_hold"}) {
+    ControllerConfig config = test::experiment(scenario, test::kCompensated).controller;
+    config.moving_frame.enabled = false;
+    const Geometry& g = config.geometry;
+    const PathChecks checks(config.safety, g);
+    const Mat6 M_1 = 5.0 * Mat6::Identity(), noise = Mat6::Zero();
+    for (int run = 0; run < 40; ++run) {
+      AdmittanceControl control(config);
+      ServoObserver servo(config.servo, 0.01);
+      PathPoint<6> at;
+      at.x << 0.02 * u(random), 0.02 * u(random), 0.02 * u(random), 0.3 * u(random),
+          0.3 * u(random), 0.3 * u(random);
+      Vec6 L = legLengths(g, g.fromHome(Pose::from(at.x)));
+      servo.reset(L, 0);
+      control.begin(at.x, M_1, 0.004, 1.0);
+      for (int n = 0; n < 60; ++n) {
+        Vec6 felt;
+        for (double& component : felt) component = u(random);
+        felt.head<3>() *= 2e4;
+        felt.tail<3>() *= 1e4;
+        const Wrench F = Wrench::from(felt);
+        const Lesson lesson;
+        const JointVector q = JointVector::Zero();
+        const Transform X_IP = g.fromHome(Pose::from(at.x));
+        at = control.step({F,
+                           F,
+                           noise,
+                           CarriedBody(M_1),
+                           1.0,
+                           {0.01, 0.004, (n + 1) * test::kTick},
+                           false,
+                           lesson,
+                           q,
+                           L,
+                           X_IP,
+                           servo},
+                          at, checks);
+        const Vec6 next = legLengths(g, g.fromHome(Pose::from(at.x)));
+        ASSERT_FALSE(checks.step(next, L, 0.01).any())
+            << run << ", step " << n << " by " << (next - L).cwiseAbs().maxCoeff();
+        ASSERT_FALSE(checks.pose(g.fromHome(Pose::from(at.x)), Pose::from(at.x), next).any())
+            << run << ", step " << n;
+        L = next;
+        slowed += control.scale() < 1.0;
+      }
+    }
+  }
+  EXPECT_GT(slowed, 500);
+}
+
 }  // namespace
 }  // namespace ves

@@ -152,6 +152,20 @@ void AdmittanceControl::slowInsideEnvelope(const PathPoint<6>& from, const Vec6&
   if (!frame_.enabled()) {
     model_.slow(low);
     shown_ = model_.motion();
+    const auto passes = [&] {
+      const Pose next = Pose::from(shown_.x);
+      const Transform X_next = geometry.fromHome(next);
+      const Vec6 L_next = legLengths(geometry, X_next);
+      return !checks.step(L_next, L, period_).any() && !checks.pose(X_next, next, L_next).any();
+    };
+    // A body turns the shortest way, which is not where its fixed angles go straight.
+    constexpr int kTries = 20;
+    for (int i = 1; i <= kTries && !passes(); ++i) {
+      const double less = i < kTries ? 0.95 : 0.0;
+      model_.slow(less);
+      shown_ = model_.motion();
+      scale_ *= less;
+    }
     return;
   }
   shown_.x = last + low * step;

@@ -118,8 +118,8 @@ void Laws::checked(const TickState& s) {
   last_checked_ = L;
 }
 
-/// What the servos are told: the checked lengths, or as far ahead of them as the servos' lag
-/// explains; stopped, the checked lengths.
+/// What the servos are told: the checked lengths, or as far ahead of them as the servos' lag, and
+/// what seals and overlapping valves take, explain; stopped, the checked lengths.
 void Laws::reference(const TickState& s) {
   if (!s.command.engaged || !s.legs.L.allFinite()) return;
   const Vec6 sent = legLengths(c_.legs, s.command.counts);
@@ -131,7 +131,8 @@ void Laws::reference(const TickState& s) {
       for (int i = 0; i < 6; ++i) {
         const double slowest = std::min(s.servo.extend(i), s.servo.retract(i)),
                      v = std::abs(s.legs.L_dot(i)), a = std::abs(s.legs.L_ddot(i));
-        most(i) += (v + 0.06 * a) / slowest + 0.06 * v;
+        most(i) += (v + 0.06 * a) / slowest + 0.06 * v +
+                   2.0 * (c_.servo.friction(i) + std::max(0.0, -c_.servo.opening(i)));
       }
   }
   if (!((ahead.cwiseAbs() - most).maxCoeff() <= 0.0))

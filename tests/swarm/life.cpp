@@ -122,7 +122,8 @@ std::vector<std::string> drawSettings(Dice& dice, const Scenario& scenario) {
       put("legs.hydraulic.breakaway_n", "750");
     }
     maybe(0.3, "legs.hydraulic.reading_noise_m", "0.00002");
-    // What a servo identification says of it: gains of the data sheet, valves open at null.
+    // What a servo identification says of it: gains of the data sheet, valves that are open at null
+    // or overlap, seals that take something.
     if (dice.chance(0.5)) {
       const auto all = [](const char* key, double value, double deviation) {
         return fmt::format(
@@ -132,7 +133,13 @@ std::vector<std::string> drawSettings(Dice& dice, const Scenario& scenario) {
       };
       put("servo", "{date: \"2026-11-21T07:40:12Z\", " + all("extend_per_s", 17.4, 0.1) +
                        all("retract_per_s", 11.35, 0.1) + all("tau_s", 0.0064, 1e-4) +
-                       all("delay_s", 0.0, 1e-4) + all("opening_m", dice.between(0.0, 3e-4), 1e-5) +
+                       all("delay_s", 0.0, 1e-4) +
+                       all("opening_m", dice.between(-3e-4, 3e-4), 1e-5) +
+                       (dice.chance(0.5) ? all("friction_m", dice.between(1e-5, 1.2e-3), 1e-5) +
+                                               fmt::format("friction_s: {}, friction_way_m: {}",
+                                                           dice.chance(0.5) ? 0.03 : 0.1,
+                                                           dice.chance(0.5) ? 1e-4 : 2.5e-4)
+                                         : "") +
                        "}");
     }
   } else {
