@@ -1120,6 +1120,15 @@ TEST(ServoIdentification, FindsWhatTheMachineIs) {
     EXPECT_EQ(rubbing.friction, kept.servo.friction);
     EXPECT_EQ(rubbing.friction_time, 0.07);
     EXPECT_EQ(rubbing.friction_way, 2e-4);
+    std::string shorter = write(kept);  // of who only knows how much
+    for (const char* key : {"friction_s:", "friction_way_m:"}) {
+      const std::size_t at = shorter.find(key);
+      shorter.erase(at, shorter.find('\n', at) + 1 - at);
+    }
+    const Value shorter_text = parseDocument(shorter, "servo.yaml");
+    const ServoModel plain = withRecord(nominal, readServo(Section(shorter_text, "")));
+    EXPECT_EQ(plain.friction, kept.servo.friction);
+    EXPECT_EQ(plain.friction_time, ServoModel().friction_time);
     // In place of what the keys say, but for what may be learnt.
     Compensation guessed;
     guessed.gain_error = guessed.timing_error = guessed.mass_error = 0.4;

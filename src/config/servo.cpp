@@ -84,7 +84,7 @@ ServoRecord readServo(Section s) {
   }
   if (!r.servo.friction.isZero(0.0))
     for (const Key<double>& key : kFriction)
-      r.servo.*key.value = s.number(key.name, key.lo, key.hi);
+      if (s.has(key.name)) r.servo.*key.value = s.number(key.name, key.lo, key.hi);
   for (const Key<double>& key : kSensorKeys) {
     r.deviation.*key.value = 0.0;
     if (!s.has(key.name)) continue;
