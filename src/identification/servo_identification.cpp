@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cmath>
+#include <future>
 #include <optional>
 #include <stdexcept>
 
@@ -129,8 +130,12 @@ ServoEstimate fit(const ServoModel& nominal, double period, double phase, const 
 ServoEstimate fitAll(const ServoModel& nominal, double period, const LegRecord& record,
                      const Parameters& wanted) {
   constexpr std::array<double, 5> kPhases = {0.1, 0.3, 0.5, 0.7, 0.9};
+  std::vector<std::future<ServoEstimate>> running;
+  for (const double phase : kPhases)
+    running.push_back(std::async(
+        std::launch::async, [&, phase] { return fit(nominal, period, phase, record, wanted); }));
   std::vector<ServoEstimate> all;
-  for (const double phase : kPhases) all.push_back(fit(nominal, period, phase, record, wanted));
+  for (std::future<ServoEstimate>& one : running) all.push_back(one.get());
   ServoEstimate out = all.front();
   const double n = kPhases.size();
   out.residual.setZero();
