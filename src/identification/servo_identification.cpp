@@ -26,10 +26,10 @@ struct Parameter {
 constexpr double kMostDelay = 0.02, kLeastTau = 1e-3;           // [s]
 constexpr double kStep = 3e-5, kFirst = 1e-4, kMostWay = 5e-3;  // [m] opening and friction
 using Parameters = std::vector<Parameter>;
-const Parameters kAlways = {{&ServoModel::extend, 0.02, 0.0, 0.0, 0.0, HUGE_VAL},
-                            {&ServoModel::retract, 0.02, 0.0, 0.0, 0.0, HUGE_VAL},
-                            {&ServoModel::tau, 0.05, 0.0, 0.0, kLeastTau, HUGE_VAL},
-                            {&ServoModel::delay, 0.0, 2e-4, 1e-3, 0.0, kMostDelay}};
+constexpr Parameter kAlways[] = {{&ServoModel::extend, 0.02, 0.0, 0.0, 0.0, HUGE_VAL},
+                                 {&ServoModel::retract, 0.02, 0.0, 0.0, 0.0, HUGE_VAL},
+                                 {&ServoModel::tau, 0.05, 0.0, 0.0, kLeastTau, HUGE_VAL},
+                                 {&ServoModel::delay, 0.0, 2e-4, 1e-3, 0.0, kMostDelay}};
 constexpr Parameter kOpen = {&ServoModel::opening, 0.0, kStep, kFirst, 0.0, kMostWay};
 constexpr Parameter kLapped = {&ServoModel::opening, 0.0, kStep, kFirst, -kMostWay, 0.0};
 constexpr Parameter kFriction = {&ServoModel::friction, 0.0, kStep, kFirst, 0.0, kMostWay};
@@ -195,21 +195,24 @@ ServoEstimate identifyServo(const ServoModel& nominal, double period, const LegR
   ServoModel plain = nominal;
   plain.opening.setZero();
   plain.friction.setZero();
-  Parameters wanted = kAlways;
+  Parameters wanted(std::begin(kAlways), std::end(kAlways));
   ServoEstimate out = fitAll(plain, period, record, wanted);
   const double rounding = nominal.readings.scale.mean() / std::sqrt(12.0);  // [m] rms
   if (out.residual.mean() < 1.2 * rounding) return out;  // nothing is left to explain
-  const auto with = [&](const Parameter& one, double first) {
-    wanted.push_back(one);
-    ServoModel begin = out.servo;
+  const auto with = [&](ServoModel begin, const Parameter& one, double first) {
     (begin.*one.value).setConstant(first);
+    wanted.push_back(one);
     const auto found = better(out, begin, period, record, wanted);
-    found ? void(out = *found) : wanted.pop_back();
+    if (found)
+      out = *found;
+    else
+      wanted.pop_back();
     return found.has_value();
   };
-  if (!with(kOpen, kFirst)) with(kLapped, -kFirst);
-  out.servo.friction_time = turnTime(out.servo, period, record, wanted);
-  if (!with(kFriction, kFirst)) return out;
+  if (!with(out.servo, kOpen, kFirst)) with(out.servo, kLapped, -kFirst);
+  ServoModel turns = out.servo;
+  turns.friction_time = turnTime(turns, period, record, wanted);
+  if (!with(turns, kFriction, kFirst)) return out;
   // Small motions would be amplified by more, were there no friction.
   constexpr double kLoudest = 5.0;  // [-]
   const double way = out.servo.friction.maxCoeff() / kLoudest;
