@@ -22,6 +22,26 @@ const std::vector<std::string> kBare = {
     "controller.compensation.feed_forward=false", "controller.compensation.observer=false",
     "controller.compensation.inertia=false", "controller.compensation.wrench=raw"};
 
+/// What an identification says of legs with friction, and of valves that overlap.
+std::vector<std::string> rubbing() {
+  const auto all = [](const std::string& key, const std::string& value) {
+    std::string text = key + ": [" + value;
+    for (int i = 1; i < kLegs; ++i) text += ", " + value;
+    return text + "], ";
+  };
+  std::string servo;
+  for (const auto& [key, value] : {std::pair{"extend_per_s", "17.4"},
+                                   {"retract_per_s", "11.35"},
+                                   {"tau_s", "0.0064"},
+                                   {"delay_s", "0.002"},
+                                   {"opening_m", "-1e-4"},
+                                   {"friction_m", "3e-4"}})
+    servo += all(key, value) + all(std::string(key) + "_deviation", "1e-5");
+  std::vector<std::string> out = test::kCompensated;
+  out.push_back("servo={date: \"2026-11-21T07:40:12Z\", " + servo + "}");
+  return out;
+}
+
 class SecondTime : public testing::TestWithParam<Case> {
  protected:
   test::ObedientMachine machine_{experiment(GetParam().scenario, GetParam().set)};
@@ -98,6 +118,7 @@ INSTANTIATE_TEST_SUITE_P(
     OfEveryKind, SecondTime,
     testing::Values(Case{"published", "puma_on_table_4_1", kBare},
                     Case{"compensated", "puma_on_table_4_1", test::kCompensated},
+                    Case{"rubbing", "puma_on_table_4_1", rubbing()},
                     Case{"passive",
                          "puma_on_table_4_1",
                          {"controller.passivity.enabled=true", "controller.passivity.reserve_j=0"}},

@@ -48,6 +48,7 @@ void LegCommander::release(const LegMotion& legs) noexcept {
     legs_ = legs;
     command_.rest = legCounts(codec_, legs.L);
   }
+  friction_.reset();  // as the servos' model begins
   hold();
 }
 
