@@ -846,7 +846,9 @@ TEST(Config, WhatGivesWayIsToldOrFollowsFromTheSimulatedLegs) {
   EXPECT_EQ(off.frequency, derived.frequency);
   EXPECT_EQ(off.feedback, derived.feedback);
   const Resonance told = resonance({"machine.legs=external", "machine.resonance.lowest_hz=15",
-                                    "machine.resonance.damping_ratio=0.05"});
+                                    "machine.resonance.damping_ratio=0.05",
+                                    "machine.resonance.turning_gain=1.2"});
+  EXPECT_EQ(told.turning, 1.2);
   EXPECT_NEAR(told.frequency, 2.0 * M_PI * 15.0, 1e-9);
   EXPECT_EQ(told.damping, 0.05);
   EXPECT_NE(refusal([&] {

@@ -415,6 +415,49 @@ TEST(Gate, AdmitsOilThatIsDampedAndRefusesWhatGrows) {
   }
 }
 
+/// [m/s] at most, in the first and in the last third of a run's admittance.
+std::pair<double, double> speeds(const Experiment& e) {
+  std::vector<double> moved;
+  for (const Row& row : recordLockstep(e).series.rows)
+    if (inAdmittance(row.state)) moved.push_back(Vec6::Map(row.state.x_dot).norm());
+  const auto third = static_cast<std::ptrdiff_t>(moved.size() / 3);
+  return {*std::max_element(moved.begin(), moved.begin() + third),
+          *std::max_element(moved.end() - third, moved.end())};
+}
+
+TEST(Gate, RefusesWhatGrowsByTurningWithFourWayValves) {
+  // A light base under soft oil; with three-way valves it decays.
+  const auto machine = [](const std::string& circuit, std::vector<std::string> more = {}) {
+    more.insert(more.end(), test::kCompensated.begin(), test::kCompensated.end());
+    return test::experiment(
+        "puma_on_table_4_1",
+        {"legs.model=hydraulic", "legs.hydraulic.circuit=" + circuit,
+         "legs.hydraulic.bulk_modulus_mpa=1800", "legs.hydraulic.hose_volume_cm3=76",
+         "legs.hydraulic.valve_hz=50", "legs.hydraulic.valve_damping=0.74",
+         "legs.hydraulic.coulomb_n=50", "legs.hydraulic.breakaway_n=75",
+         "legs.hydraulic.viscous_n_s_per_m=2300", "legs.hydraulic.pressure_feedback_ma_per_mpa=0.7",
+         "sensor.cutoff_hz=3", "sensor.readings_per_tick=4", "gravity_m_per_s2=0",
+         "base={mass_diagonal: [24, 24, 24, 13, 13, 13], "
+         "damping_diagonal: [16.5, 16.5, 16.5, 9, 9, 9], "
+         "stiffness_diagonal: [12800, 12800, 12800, 7000, 7000, 7000]}",
+         "program=[{move: {}}, {calibration: {}}, {move: {to: {x_m: 0.002, z_m: 0.0014}}}, "
+         "{admittance: {duration_s: 15}}]"},
+        more);
+  };
+  const Experiment four = machine("four_way"), three = machine("three_way");
+  const auto [first, last] = speeds(four);
+  EXPECT_GT(last, 1.2 * first);
+  const auto [three_first, three_last] = speeds(three);
+  EXPECT_LT(three_last, 0.9 * three_first);
+  EXPECT_TRUE(isStable(three.controller, three.plant.task));
+  const LoopVerdict v = assessStability(four.controller, four.plant.task);
+  EXPECT_FALSE(v.stable);
+  EXPECT_EQ(v.direction, Direction::kSwinging) << explain(v);
+  // It is the turning that decides.
+  const Experiment told = machine("four_way", {"machine.resonance.turning_gain=1"});
+  EXPECT_TRUE(isStable(told.controller, told.plant.task));
+}
+
 TEST(Gate, NamesWhatCuresAMachineThatGivesWay) {
   const Experiment bare = onOil("1400", "0");
   const std::string said = explain(assessStability(bare.controller, bare.plant.task));
@@ -467,7 +510,7 @@ TEST(Gate, NothingOfTheSimulatedMachineChangesItsVerdict) {
     std::vector<std::string> set = {"legs.model=hydraulic"};
     if (!key.empty()) set.push_back(fmt::format("plant_mismatch={{{}: 0.8}}", key));
     const Resonance r = test::experiment("puma_on_table_4_1", set).controller.resonance;
-    return std::tuple(r.frequency, r.damping, r.feedback, r.feedback_time);
+    return std::tuple(r.frequency, r.damping, r.feedback, r.feedback_time, r.turning);
   };
   EXPECT_GT(std::get<0>(resonance("")), 0.0);
   for (const char* key :

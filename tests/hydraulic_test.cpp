@@ -42,8 +42,8 @@ double plateLoad(const Experiment& e) {
 /// One leg that pushes a mass along its line, against a constant load.
 class PushedMass {
  public:
-  PushedMass(const HydraulicLegModel& model, double mass, double load)
-      : leg_(model, 1.5, load), mass_(mass), load_(load) {}
+  PushedMass(const HydraulicLegModel& model, double mass, double load, double length = 1.5)
+      : leg_(model, length, load), mass_(mass), load_(load), L_(length) {}
 
   void step(double current, double dt) {
     const SecondOrderHold half = leg_.prepare(0.5 * dt);
@@ -73,7 +73,7 @@ class PushedMass {
  private:
   HydraulicLeg leg_;
   double mass_, load_;
-  double L_ = 1.5, v_ = 0.0;
+  double L_, v_ = 0.0;
 };
 
 /// [m/s] after a start at the middle, by the time at which all has settled: the mean of a stretch.
@@ -354,6 +354,50 @@ TEST(HydraulicPlatform, LosesItsSwingInOpenValvesAndSeals) {
       least = std::min(least, s.damping);
     }
     EXPECT_NEAR(believed(e).damping / least, 1.0, 0.1) << circuit;
+  }
+}
+
+/// [m/s] mean speed of a leg that goes to and fro by `way` [m] about `length` [m].
+double toAndFro(const HydraulicLegModel& model, double length, double way) {
+  constexpr double kCurrent = 1e-3, kFine = 20e-6;  // [A], [s]
+  PushedMass m(model, 0.05, 0.0, length);
+  double t = 0.0, turned = 0.0, path = 0.0, timed = 0.0;
+  double current = kCurrent;
+  // Until its pressures have settled in the swing, and then for as many turns again.
+  const int turns = std::max(2, static_cast<int>(0.03 / way));
+  for (int n = 0; n < 4 * turns;) {
+    m.step(current, kFine);
+    t += kFine;
+    if (std::copysign(1.0, current) * (m.length() - length) < 0.5 * way) continue;
+    current = -current;
+    if (++n >= 2 * turns) {
+      if (n > 2 * turns) {
+        path += std::abs(m.length() - turned);
+        timed += t;
+      }
+      turned = m.length();
+      t = 0.0;
+    }
+  }
+  return path / timed;
+}
+
+TEST(HydraulicPlatform, FourWayLegsAreQuickerWhereTheyTurn) {
+  // To and fro over a way in which the pressures change by a tenth of what they do from one
+  // direction to the other, and over one in which they have long done so.
+  for (const char* circuit : kCircuits) {
+    const Experiment e = experiment(
+        "z_sine", with({"legs.model=hydraulic", std::string("legs.hydraulic.circuit=") + circuit,
+                        "legs.hydraulic.valve_hz=10000", "legs.hydraulic.valve_opening_ma=0",
+                        "legs.hydraulic.bulk_modulus_mpa=500"},
+                       kOilAlone));
+    HydraulicLegModel leg = e.plant.hydraulic->leg;
+    const double L = legLengths(e.plant.geometry, e.plant.geometry.fromHome({}))(0);
+    leg.valve.null = 0.0;
+    leg.seals.viscous = 20.0;  // so little mass rings
+    const double turning = toAndFro(leg, L, 0.4e-3) / toAndFro(leg, L, 0.3);
+    EXPECT_NEAR(believed(e).turning, turning, 0.02) << circuit;
+    EXPECT_EQ(believed(e).turning == 1.0, std::string(circuit) == "three_way");
   }
 }
 

@@ -19,11 +19,12 @@ using Eigen::VectorXd;
 
 /// Leg and sensor of one direction, between two updates: x' = A x + B v_end, where v_end is the
 /// speed that the valve's current leads to. x = {length, speed, what the valve has let in, its rate
-/// and what of it pressure feedback takes for lasting (3), Filter 3 (3), sensor (2)}. A machine
-/// that gives way follows its oil as
+/// and what of it pressure feedback takes for lasting (3), v_end behind the pressures that it leads
+/// to, Filter 3 (3), sensor (2)}. A machine that gives way follows its oil as
 ///   length'' = w^2 (oil - length) - 2 zeta w length'
 struct Mechanics {
-  static constexpr Index kSize = 10, kLength = 0, kSpeed = 1, kOil = 2, kFilter = 5, kSensor = 8;
+  static constexpr Index kSize = 11, kLength = 0, kSpeed = 1, kOil = 2, kTurned = 5, kFilter = 6,
+                         kSensor = 9;
   MatrixXd A = MatrixXd::Zero(kSize, kSize);
   VectorXd B = VectorXd::Zero(kSize);
 };
@@ -31,14 +32,17 @@ struct Mechanics {
 Mechanics mechanicsOf(const Loop& loop) {
   Mechanics m;
   constexpr Index y = Mechanics::kLength, v = Mechanics::kSpeed, q = Mechanics::kOil,
-                  f = Mechanics::kFilter, s = Mechanics::kSensor;
+                  t = Mechanics::kTurned, f = Mechanics::kFilter, s = Mechanics::kSensor;
   m.A(y, v) = 1.0;
   const Resonance& o = loop.resonance;
   const double w_o = o.frequency;
   const bool gives = w_o > 0.0;
   const Index driven = gives ? q + 1 : v;
   m.A(driven, driven) = -1.0 / loop.tau;
-  m.B(driven) = 1.0 / loop.tau;
+  m.B(driven) = o.turning / loop.tau;
+  m.A(driven, t) = (1.0 - o.turning) / loop.tau;
+  m.A(t, t) = -1.0 / o.turning_time;
+  m.B(t) = 1.0 / o.turning_time;
   if (gives) {
     m.A(q, q + 1) = 1.0;
     m.A(v, q) = w_o * w_o;
@@ -206,14 +210,15 @@ Channel channelOf(const Loop& loop, const std::optional<Leaning>& contact, Matri
   const MatrixXd all = throughPeriod(loop.period, events, generator, places);
   std::vector<Index> kept;
   for (Index i = 0; i < kSize; ++i) {
-    const bool oil = i >= Mechanics::kOil && i < Mechanics::kFilter,
-               lasting = i == Mechanics::kOil + 2,
+    const bool oil = i >= Mechanics::kOil && i < Mechanics::kTurned,
+               lasting = i == Mechanics::kOil + 2, turned = i == Mechanics::kTurned,
                filter = i >= Mechanics::kFilter && i < Mechanics::kSensor,
                history = i >= kHistory && i < kSum, sum = i == kSum || i == kForceSum;
     if (i != kFirst && (!oil || loop.resonance.frequency > 0.0) &&
-        (!lasting || loop.resonance.feedback > 0.0) && (!filter || loop.filter_cutoff > 0.0) &&
-        (!history || loop.derivative_gain > 0.0) && (!sum || loop.readings > 1) &&
-        (i < kOther || contact) && (i < kOther || i >= kForce || contact->inverse_mass > 0.0))
+        (!lasting || loop.resonance.feedback > 0.0) && (!turned || loop.resonance.turning != 1.0) &&
+        (!filter || loop.filter_cutoff > 0.0) && (!history || loop.derivative_gain > 0.0) &&
+        (!sum || loop.readings > 1) && (i < kOther || contact) &&
+        (i < kOther || i >= kForce || contact->inverse_mass > 0.0))
       kept.push_back(i);
   }
   if (places) {

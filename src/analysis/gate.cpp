@@ -35,18 +35,27 @@ std::vector<double> resonances(const ControllerConfig& controller) {
   return {0.9 * lowest, 1.25 * lowest, 1.7 * lowest, 2.4 * lowest};
 }
 
+/// [s] that legs which turn stay quicker, for which a loop is judged: the smaller the swing, the
+/// longer.
+std::vector<double> turningTimes(const Loop& loop) {
+  if (loop.resonance.turning == 1.0) return {loop.resonance.turning_time};
+  return {0.01, 0.03, 0.1, 0.3, 1.0};
+}
+
 /// A controller's loops of one direction at `q`: every share of the wrench that a dead band leaves,
-/// every resonance.
+/// every resonance, every time that legs stay quicker.
 std::vector<Loop> loopsOf(const ControllerConfig& controller, const JointVector& q,
                           Direction direction) {
   std::vector<Loop> out;
   Loop loop = loopOf(controller, q, direction);
   for (const double share : feltShares(controller))
-    for (const double frequency : resonances(controller)) {
-      loop.felt = share;
-      loop.resonance.frequency = frequency;
-      out.push_back(loop);
-    }
+    for (const double frequency : resonances(controller))
+      for (const double time : turningTimes(loop)) {
+        loop.felt = share;
+        loop.resonance.frequency = frequency;
+        loop.resonance.turning_time = time;
+        out.push_back(loop);
+      }
   return out;
 }
 
@@ -172,6 +181,7 @@ LoopVerdict assessStability(const ControllerConfig& controller, const RobotTask&
     Loop& kept = direction == Direction::kExtending    ? out.extending
                  : direction == Direction::kRetracting ? out.retracting
                  : direction == Direction::kTurning    ? out.turning
+                 : direction == Direction::kSwinging   ? out.swinging
                                                        : out.near_null;
     for (const Loop& loop : loopsOf(controller, task.initial_joints, direction)) {
       for (const CarriedRobot& robot : robots) {

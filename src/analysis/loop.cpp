@@ -193,6 +193,7 @@ std::vector<Direction> directionsOf(const ControllerConfig& controller) {
   std::vector<Direction> out = {Direction::kExtending, Direction::kRetracting};
   const ServoModel& servo = controller.servo;
   if (servo.opening.maxCoeff() > 0.0) out.push_back(Direction::kNearNull);
+  if (controller.resonance.turning != 1.0) out.push_back(Direction::kSwinging);
   if (controller.compensation.feed_forward &&
       (servo.friction.maxCoeff() > 0.0 || servo.opening.minCoeff() < 0.0))
     out.push_back(Direction::kTurning);
@@ -230,6 +231,7 @@ Loop loopOf(const ControllerConfig& controller, const JointVector& q, Direction 
   loop.derivative_gain = model * own.servo.derivative / (ServoModel::kSpan * own.servo.update);
   loop.tau = own.servo.tau(0);
   loop.resonance = controller.resonance;
+  if (direction != Direction::kSwinging) loop.resonance.turning = 1.0;
   loop.sensor_cutoff = own.servo.sensor_cutoff;
   loop.filter_cutoff = own.servo.filter_cutoff;
   loop.readings = own.servo.sensor_readings;

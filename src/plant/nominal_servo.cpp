@@ -12,6 +12,29 @@ namespace {
 constexpr double kFractional = 256.0;  // eight bits of U, (2.7a)
 constexpr double kUpdate = static_cast<double>(kUpdatePeriod) * kSecondPerNanosecond;
 
+/// [-] speed of a four-way leg without load that swings about `length` [m] so little that its
+/// pressures stay, over the one that they lead to. In units of p_S and of k x sqrt(p_S)/A_1,
+/// a = A_2/A_1:
+///   A_1 v + (V_1/beta) p_1' = Q_1,  A_2 v - (V_2/beta) p_1'/a = Q_2   of (2.15), p_2 = p_1/a
+/// They stay where both ways change them alike.
+double turningOf(const HydraulicLegModel& leg, double length) {
+  const double a = leg.cylinder.rod_side / leg.cylinder.bore, most = 1.0 + a * a * a;
+  const double V_1 = boreVolume(leg, length), V_2 = rodVolume(leg, length),
+               share = V_2 / (V_2 + a * a * V_1);
+  double up = 0.0, down = 0.0, low = a * a * a / most, high = a / most;
+  for (int n = 0; n < 60; ++n) {
+    const double p_1 = 0.5 * (low + high), p_2 = p_1 / a;
+    const double in_1 = std::sqrt(1.0 - p_1), out_1 = std::sqrt(p_1), in_2 = std::sqrt(1.0 - p_2),
+                 out_2 = std::sqrt(p_2);
+    up = share * in_1 + (1.0 - share) / a * out_2;
+    down = share * out_1 + (1.0 - share) / a * in_2;
+    (in_1 / up > out_1 / down ? low : high) = p_1;
+  }
+  // What either way leads to: v^2 (1 + a^3) = 1 and = a.
+  const auto both = [](double v, double w) { return v * w / (v + w); };
+  return both(up, down) * std::sqrt(most) / both(1.0, std::sqrt(a));
+}
+
 }  // namespace
 
 double servoRail(const LegSlaveGains& gains, const Temposonics& transducer) {
@@ -83,6 +106,7 @@ Resonance nominalResonance(const HydraulicModel& hydraulic, const ActuatorModel&
   const double speed = 0.5 * (gains.gain_extend + gains.gain_retract);  // [m/s/A]
   out.feedback = speed * leg.valve.feedback * k / c.bore;
   out.feedback_time = leg.valve.feedback_time;
+  if (four_way) out.turning = turningOf(leg, L);
   return out;
 }
 

@@ -26,11 +26,12 @@ struct LoopVerdict {
   DominantRoot at_off;           // and what grows there
   DominantRoot worst;
   Direction direction = Direction::kExtending;
-  Loop extending, retracting, near_null, turning;  // in the pose where each is worst
+  Loop extending, retracting, near_null, turning, swinging;  // in the pose where each is worst
   const Loop& at(Direction which) const {
     return which == Direction::kExtending    ? extending
            : which == Direction::kRetracting ? retracting
            : which == Direction::kTurning    ? turning
+           : which == Direction::kSwinging   ? swinging
                                              : near_null;
   }
   int modes = 0;              // [-] kept

@@ -92,7 +92,8 @@ Loop off(Loop loop, const Uncertainty& by, int timing, int gain);
 /// The gain of a leg depends on which way it moves. A leg that swings has the harmonic mean, as
 /// long as its speed is nearly a sine. Near null both edges of valves that are open there pass. A
 /// leg that turns round is told more than goes that way, where friction or overlap is believed in:
-/// the loop is judged as if neither were there.
+/// the loop is judged as if neither were there. Legs that swing are a loop of their own where they
+/// are quicker after a turn (Resonance::turning).
 enum class Direction { kExtending, kRetracting, kSwinging, kNearNull, kTurning };
 const char* name(Direction direction);
 

@@ -25,7 +25,8 @@ ServoModel nominalServo(const LegSlaveGains& gains, const ActuatorModel& actuato
 
 /// The lowest of the six modes of plate and load on the oil behind closed valves at home, and the
 /// least damping of any, by what flows at null with the pressure and by viscous seals; sliding
-/// friction is not counted. `hydraulic` with its areas fitted.
+/// friction is not counted. What four-way legs gain as they turn, without load. `hydraulic` with
+/// its areas fitted.
 Resonance nominalResonance(const HydraulicModel& hydraulic, const ActuatorModel& gains,
                            const Geometry& geometry, const RigidBody& load_P);
 
