@@ -79,7 +79,7 @@ int doctorCommand(int argc, char** argv) {
       ->capture_default_str();
   addUrl(cli, url);
   return run(cli, argc, argv, [&] {
-    std::vector<Finding> findings = examineMachine();
+    std::vector<Finding> findings = examine(readMachineFacts());
     const bool shared = busWorks(url);
     bool alone = shared;
     if (!shared) {

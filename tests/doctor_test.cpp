@@ -5,7 +5,11 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
+
 #include "support/programs.hpp"
+#include "support/rig.hpp"
+#include "ves/realtime/realtime.hpp"
 
 namespace ves {
 namespace {
@@ -33,6 +37,105 @@ TEST(Cyclictest, HistogramIsReadWithWhatOverflowedIt) {
   EXPECT_DOUBLE_EQ(l->max, 2425e-6);
   EXPECT_FALSE(cyclictestLatency("").has_value());
   EXPECT_FALSE(cyclictestLatency("unable to set scheduling\n000010 -1\n").has_value());
+}
+
+/// Of a machine that lacks nothing, but for what `change` takes from it.
+Finding found(const std::string& what, const std::function<void(MachineFacts&)>& change) {
+  MachineFacts m{"Linux 6, RT", true, 2,       "performance",  1, "tsc", true,
+                 true,          99,   1 << 30, 2 * 1024 * 1024};
+  for (const Finding& f : examine(m)) {
+    EXPECT_EQ(f.state, Finding::State::kGood) << f.what;
+    EXPECT_EQ(f.remedy, "") << f.what;
+  }
+  change(m);
+  Finding out;
+  for (const Finding& f : examine(m)) {
+    if (f.what == what) {
+      out = f;
+      continue;
+    }
+    EXPECT_EQ(f.state, Finding::State::kGood) << f.what << " beside " << what;
+  }
+  EXPECT_EQ(out.state == Finding::State::kGood, out.remedy.empty()) << what;
+  return out;
+}
+
+TEST(Examination, OneThingThatIsMissingIsSaidWithItsRemedy) {
+  using State = Finding::State;
+  struct Case {
+    const char* what;
+    std::function<void(MachineFacts&)> change;
+    State state;
+    const char *said, *remedy;
+  };
+  const Case cases[] = {
+      {"kernel", [](auto& m) { m.real_time_kernel = false; }, State::kAdvice, "Linux 6, RT",
+       "linux-image-rt"},
+      {"processors", [](auto& m) { m.processors = 1; }, State::kAdvice, "1, governor performance",
+       "share one core"},
+      {"processors", [](auto& m) { m.governor = "powersave"; }, State::kAdvice,
+       "2, governor powersave", "frequency-set -g performance"},
+      {"processors", [](auto& m) { m.governor = ""; }, State::kGood, "2", ""},
+      {"clock", [](auto& m) { m.clock_resolution = 1001; }, State::kBad,
+       "monotonic, 1001 ns, source tsc", "highres=off"},
+      {"clock", [](auto& m) { m.clock_resolution = 1000; }, State::kGood, "1000 ns", ""},
+      {"clock", [](auto& m) { m.clock_resolution = 4'000'000; }, State::kBad, "4000000 ns",
+       "highres=off"},
+      {"clock", [](auto& m) { m.clock_source = "hpet"; }, State::kAdvice, "source hpet",
+       "clocksource=tsc"},
+      {"clock", [](auto& m) { m.clock_source = "acpi_pm"; }, State::kAdvice, "source acpi_pm",
+       "clocksource=tsc"},
+      {"clock", [](auto& m) { m.clock_source = ""; }, State::kGood, "1 ns", ""},
+      {"scheduler", [](auto& m) { m.fifo = false; }, State::kAdvice, "ulimit -r is 99",
+       "rtprio 99"},
+      {"memory", [](auto& m) { m.lockable = false; }, State::kAdvice, "1048576 KiB",
+       "memlock unlimited"},
+      {"socket buffers", [](auto& m) { m.socket_buffer = 2 * 1024 * 1024 - 1; }, State::kAdvice,
+       "2047 KiB", "rmem_max=2097152"},
+  };
+  for (const Case& c : cases) {
+    const Finding f = found(c.what, c.change);
+    EXPECT_EQ(f.state, c.state) << c.what << ": " << f.found;
+    EXPECT_NE(f.found.find(c.said), std::string::npos) << f.found;
+    EXPECT_NE(f.remedy.find(c.remedy), std::string::npos) << f.remedy;
+  }
+}
+
+TEST(Examination, ReadsWhatTheShellSays) {
+  const MachineFacts m = readMachineFacts();
+  const auto said = [](const std::string& command) {
+    std::string text = test::sh(command).text;
+    while (!text.empty() && text.back() == '\n') text.pop_back();
+    return text;
+  };
+  EXPECT_EQ(m.kernel, said("uname -s") + " " + said("uname -r") + ", " + said("uname -v"));
+  EXPECT_EQ(std::to_string(m.processors), said("nproc"));
+  EXPECT_EQ(std::to_string(m.socket_buffer), said("cat /proc/sys/net/core/rmem_max"));
+  EXPECT_EQ(m.clock_source,
+            said("cat /sys/devices/system/clocksource/clocksource0/current_clocksource"));
+  EXPECT_EQ(std::to_string(m.priority_limit), said("ulimit -r"));
+  const std::string lock = said("ulimit -l");
+  if (lock != "unlimited") {
+    EXPECT_EQ(std::to_string(m.lock_limit / 1024), lock);
+  }
+  EXPECT_EQ(m.fifo, test::sh("chrt -f 80 true").status == 0);
+}
+
+// Asked for so many, there are so many, and none is longer than the whole took.
+TEST(BusTimes, AreOfAsManyAsWereAskedFor) {
+  const std::int64_t began = monotonicNow();
+  const auto all = [&](const char* what, const Latency& l, int n) {
+    EXPECT_EQ(l.n, n) << what;
+    EXPECT_GT(l.median, 0.0) << what;
+    EXPECT_GE(l.p99, l.median) << what;
+    EXPECT_GE(l.max, l.p99) << what;
+    EXPECT_LT(l.max, static_cast<double>(monotonicNow() - began) * kSecondPerNanosecond) << what;
+  };
+  constexpr std::int64_t kPeriod = 2'000'000;  // [ns]
+  all("wakes", wakeUp(0.1, kPeriod), 50);
+  enterPrivateBus();
+  all("echo", echo(kDefaultUrl, 30), 30);
+  all("response", response(test::experiment("z_sine"), kDefaultUrl, 30), 30);
 }
 
 class Doctor : public test::Programs {};

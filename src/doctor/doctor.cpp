@@ -52,77 +52,63 @@ bool fifo() {
 }
 bool locked() { return mlockall(MCL_CURRENT | MCL_FUTURE) == 0; }
 
-Finding kernel() {
-  utsname name{};
-  uname(&name);
-  const std::string version = name.version;
-  Finding f{State::kGood, "kernel", fmt::format("{} {}, {}", name.sysname, name.release, version),
-            ""};
-  if (version.find("PREEMPT_RT") == std::string::npos && firstLine("/sys/kernel/realtime") != "1") {
+Finding kernel(const MachineFacts& m) {
+  Finding f{State::kGood, "kernel", m.kernel, ""};
+  if (!m.real_time_kernel) {
     f.state = State::kAdvice;
     f.remedy = "no real-time kernel; for hard limits: apt install linux-image-rt-amd64";
   }
   return f;
 }
 
-Finding processors() {
-  const unsigned n = std::thread::hardware_concurrency();
-  const std::string governor = firstLine("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor");
+Finding processors(const MachineFacts& m) {
   Finding f{State::kGood, "processors",
-            fmt::format("{}{}", n, governor.empty() ? "" : ", governor " + governor), ""};
-  if (n < 2) {
+            fmt::format("{}{}", m.processors, m.governor.empty() ? "" : ", governor " + m.governor),
+            ""};
+  if (m.processors < 2) {
     f.state = State::kAdvice;
     f.remedy = "controller and plant share one core; two are better";
-  } else if (!governor.empty() && governor != "performance") {
+  } else if (!m.governor.empty() && m.governor != "performance") {
     f.state = State::kAdvice;
     f.remedy = "cpupower frequency-set -g performance";
   }
   return f;
 }
 
-Finding clockSource() {
-  timespec resolution{};
-  clock_getres(CLOCK_MONOTONIC, &resolution);
-  const std::string source =
-      firstLine("/sys/devices/system/clocksource/clocksource0/current_clocksource");
+Finding clockSource(const MachineFacts& m) {
   Finding f{State::kGood, "clock",
-            fmt::format("monotonic, {} ns{}", resolution.tv_nsec,
-                        source.empty() ? "" : ", source " + source),
+            fmt::format("monotonic, {} ns{}", m.clock_resolution,
+                        m.clock_source.empty() ? "" : ", source " + m.clock_source),
             ""};
-  if (resolution.tv_sec > 0 || resolution.tv_nsec > 1000) {
+  if (m.clock_resolution > 1000) {
     f.state = State::kBad;
     f.remedy = "no high-resolution timers: boot without highres=off";
-  } else if (source == "acpi_pm" || source == "hpet") {
+  } else if (m.clock_source == "acpi_pm" || m.clock_source == "hpet") {
     f.state = State::kAdvice;
     f.remedy = "a slow clock; boot with clocksource=tsc where the processor's is constant";
   }
   return f;
 }
 
-Finding scheduler() {
-  rlimit limit{};
-  getrlimit(RLIMIT_RTPRIO, &limit);
-  if (granted(fifo)) return {State::kGood, "scheduler", "SCHED_FIFO granted", ""};
+Finding scheduler(const MachineFacts& m) {
+  if (m.fifo) return {State::kGood, "scheduler", "SCHED_FIFO granted", ""};
   return {State::kAdvice, "scheduler",
-          fmt::format("SCHED_FIFO refused (ulimit -r is {})", limit.rlim_cur),
+          fmt::format("SCHED_FIFO refused (ulimit -r is {})", m.priority_limit),
           "as root, or '@realtime - rtprio 99' in /etc/security/limits.d; without it: best effort"};
 }
 
-Finding memory() {
-  if (granted(locked)) return {State::kGood, "memory", "can be locked", ""};
-  rlimit limit{};
-  getrlimit(RLIMIT_MEMLOCK, &limit);
+Finding memory(const MachineFacts& m) {
+  if (m.lockable) return {State::kGood, "memory", "can be locked", ""};
   return {State::kAdvice, "memory",
-          fmt::format("cannot be locked (ulimit -l is {} KiB)", limit.rlim_cur / 1024),
+          fmt::format("cannot be locked (ulimit -l is {} KiB)", m.lock_limit / 1024),
           "as root, or '@realtime - memlock unlimited' in /etc/security/limits.d"};
 }
 
-Finding sockets() {
+Finding sockets(const MachineFacts& m) {
   constexpr long kEnough = 2 * 1024 * 1024;  // [B] a second of everything on the bus, and more
-  const std::string text = firstLine("/proc/sys/net/core/rmem_max");
-  const long bytes = std::atol(text.c_str());
-  Finding f{State::kGood, "socket buffers", fmt::format("at most {} KiB", bytes / 1024), ""};
-  if (bytes < kEnough) {
+  Finding f{State::kGood, "socket buffers", fmt::format("at most {} KiB", m.socket_buffer / 1024),
+            ""};
+  if (m.socket_buffer < kEnough) {
     f.state = State::kAdvice;
     f.remedy =
         fmt::format("messages may be lost under load: sysctl -w net.core.rmem_max={}", kEnough);
@@ -153,8 +139,33 @@ std::optional<Latency> cyclictestLatency(const std::string& text) {
   return latencyOf(all);
 }
 
-std::vector<Finding> examineMachine() {
-  return {kernel(), processors(), clockSource(), scheduler(), memory(), sockets()};
+MachineFacts readMachineFacts() {
+  MachineFacts m;
+  utsname name{};
+  uname(&name);
+  const std::string version = name.version;
+  m.kernel = fmt::format("{} {}, {}", name.sysname, name.release, version);
+  m.real_time_kernel =
+      version.find("PREEMPT_RT") != std::string::npos || firstLine("/sys/kernel/realtime") == "1";
+  m.processors = std::thread::hardware_concurrency();
+  m.governor = firstLine("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor");
+  timespec resolution{};
+  clock_getres(CLOCK_MONOTONIC, &resolution);
+  m.clock_resolution = resolution.tv_sec * 1'000'000'000LL + resolution.tv_nsec;
+  m.clock_source = firstLine("/sys/devices/system/clocksource/clocksource0/current_clocksource");
+  m.fifo = granted(fifo);
+  m.lockable = granted(locked);
+  rlimit limit{};
+  getrlimit(RLIMIT_RTPRIO, &limit);
+  m.priority_limit = limit.rlim_cur;
+  getrlimit(RLIMIT_MEMLOCK, &limit);
+  m.lock_limit = limit.rlim_cur;
+  m.socket_buffer = std::atol(firstLine("/proc/sys/net/core/rmem_max").c_str());
+  return m;
+}
+
+std::vector<Finding> examine(const MachineFacts& m) {
+  return {kernel(m), processors(m), clockSource(m), scheduler(m), memory(m), sockets(m)};
 }
 
 Latency wakeUp(double seconds, std::int64_t period) {

@@ -23,8 +23,25 @@ struct Finding {
   std::string what, found, remedy;
 };
 
-/// Kernel, privileges, clock, processor, sockets: what can be read. Changes nothing.
-std::vector<Finding> examineMachine();
+/// What can be read of a machine.
+struct MachineFacts {
+  std::string kernel;
+  bool real_time_kernel = false;
+  unsigned processors = 0;              // [-]
+  std::string governor;                 // of their frequency; empty: unknown
+  std::int64_t clock_resolution = 0;    // [ns]
+  std::string clock_source;             // empty: unknown
+  bool fifo = false, lockable = false;  // real-time priority, and memory that stays
+  std::uint64_t priority_limit = 0;     // [-]
+  std::uint64_t lock_limit = 0;         // [B]
+  long socket_buffer = 0;               // [B] at most
+};
+
+/// Of this one. Changes nothing.
+MachineFacts readMachineFacts();
+
+/// What of it keeps the loop from its time.
+std::vector<Finding> examine(const MachineFacts& machine);
 
 /// How late a Ticker wakes, for `seconds` at `period` [ns], at the priority that is granted.
 Latency wakeUp(double seconds, std::int64_t period);
