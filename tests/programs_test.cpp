@@ -5,6 +5,8 @@
 
 #include <fcntl.h>
 
+#include <map>
+#include <numeric>
 #include <set>
 
 #include "ves/evaluation/let_go.hpp"
@@ -300,6 +302,60 @@ TEST_F(Programs, RealTimeRunOfTwoProcesses) {
   EXPECT_EQ(s["ended"], "parked");
   EXPECT_NEAR(s["z_peak_to_peak_m"].get<double>(), 0.04, 1e-3);
   EXPECT_TRUE(s.contains("wake_up_late_median_s"));
+
+  // The times of every tick add up, as the message's description says.
+  LogReader reader((folder_ / "a/run.lcmlog").string());
+  std::map<std::int64_t, sample_t> samples;
+  std::map<std::int64_t, state_t> states;
+  std::vector<timing_t> timings;
+  for (LogEvent event; reader.next(event);) {
+    const auto size = static_cast<std::uint32_t>(event.data.size());
+    if (event.channel == channel::kTiming)
+      timings.push_back(*decode<timing_t>(event.data.data(), size));
+    if (event.channel == channel::kSample) {
+      const auto m = *decode<sample_t>(event.data.data(), size);
+      samples[m.header.sequence] = m;
+    }
+    if (event.channel == channel::kState) {
+      const auto m = *decode<state_t>(event.data.data(), size);
+      states[m.header.sequence] = m;
+    }
+  }
+  ASSERT_GT(timings.size(), 300U);
+  std::int64_t missed = 0;
+  for (const timing_t& t : timings) {
+    EXPECT_EQ(t.receive_ns + t.tick_ns + t.send_ns, t.compute_ns);
+    EXPECT_EQ(t.sample_to_command_ns, t.sample_age_ns + t.compute_ns);
+    for (const std::int64_t one : {t.late_ns, t.receive_ns, t.tick_ns, t.send_ns, t.tell_ns})
+      EXPECT_GE(one, 0);
+    EXPECT_EQ(t.missed, t.missed_ran_long + t.missed_woke_late);
+    // One process' clock is the other's.
+    EXPECT_EQ(t.clock_offset_ns, 0);
+    // Of the ticks so far each is in each histogram once; those that were skipped are in none.
+    // (Some of these messages may be lost.)
+    const auto all = [](const std::int32_t(&bins)[20]) {
+      return std::accumulate(std::begin(bins), std::end(bins), std::int64_t{0});
+    };
+    const std::int64_t count = all(t.late);
+    EXPECT_EQ(all(t.compute), count);
+    EXPECT_EQ(all(t.sample_age), count);
+    EXPECT_EQ(all(t.sample_to_command), count);
+    EXPECT_EQ(t.header.sequence, count - 1 + t.missed);
+    EXPECT_GE(t.missed, missed);
+    missed = t.missed;
+    const auto state = states.find(t.header.sequence);
+    ASSERT_NE(state, states.end());
+    const auto sample = samples.find(state->second.sample_sequence);
+    ASSERT_NE(sample, samples.end());
+    const sample_t& m = sample->second;
+    EXPECT_EQ(t.legs_age_ns - t.sample_age_ns, m.header.time_ns - m.legs_time_ns);
+    EXPECT_EQ(t.wrench_age_ns - t.sample_age_ns, m.header.time_ns - m.wrench_time_ns);
+    EXPECT_EQ(t.joints_age_ns - t.sample_age_ns, m.header.time_ns - m.joints_time_ns);
+    EXPECT_GE(t.sample_age_ns, 0);
+    EXPECT_EQ(t.samples_malformed + t.samples_out_of_range + t.samples_of_another + t.samples_old +
+                  t.messages_forged + t.messages_replayed,
+              0);
+  }
 }
 
 // The example of a flight controller: in Python, in a process of its own, over the bus.
