@@ -23,9 +23,9 @@ setup_t setup() {
   return toMessage(setupOf(test::experiment("puma_on_table_4_1"), false), header({1, 1}, 0, 0));
 }
 
-/// Two seconds of a good machine at `rate`, spoilt sample by sample; what is not kept. `spoil` may
-/// drop a sample (false).
-Names broken(const std::function<bool(int, sample_t&)>& spoil, double rate = 500.0) {
+/// Two seconds of a good machine at `rate`, spoilt sample by sample. `spoil` may drop a sample
+/// (false).
+std::vector<Requirement> judged(const std::function<bool(int, sample_t&)>& spoil, double rate) {
   const setup_t s = setup();
   SampleJudge judge(s, 0);
   const auto period = static_cast<std::int64_t>(1e9 / rate);
@@ -47,8 +47,13 @@ Names broken(const std::function<bool(int, sample_t&)>& spoil, double rate = 500
     m.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
     judge.take(bytes.data(), std::ssize(bytes), now);
   }
+  return judge.verdict(2'000'000'000);
+}
+
+/// What is not kept.
+Names broken(const std::function<bool(int, sample_t&)>& spoil, double rate = 500.0) {
   Names out;
-  for (const Requirement& r : judge.verdict(2'000'000'000))
+  for (const Requirement& r : judged(spoil, rate))
     if (!r.kept) out.insert(r.name);
   return out;
 }
@@ -57,6 +62,53 @@ TEST(Conform, AGoodMachineKeepsAll) {
   const auto good = [](int, sample_t&) { return true; };
   for (const double rate : {95.0, 100.0, 200.0, 500.0, 1000.0})
     EXPECT_EQ(broken(good, rate), Names());
+}
+
+/// What is said of a requirement when every sample is spoilt so.
+std::string said(const std::string& name, const std::function<void(sample_t&)>& spoil) {
+  for (const Requirement& r : judged(
+           [&](int, sample_t& m) {
+             spoil(m);
+             return true;
+           },
+           500.0))
+    if (r.name == name) return r.found;
+  return "(nothing)";
+}
+
+TEST(Conform, SaysWhichValueIsOutOfRange) {
+  const setup_t s = setup();
+  const auto nothing = [](sample_t&) {};
+  EXPECT_EQ(said("ranges", nothing), "all within");
+  EXPECT_EQ(said("joints", nothing), "all");
+  EXPECT_EQ(said("force sensor", nothing), "0 channels stand");
+  EXPECT_EQ(said("ranges", [](sample_t& m) { m.adc[0] = -32769; }), "adc[0] -32769");
+  EXPECT_EQ(said("ranges", [](sample_t& m) { m.adc[6] = 32768; }), "adc[6] 32768");
+  EXPECT_EQ(said("ranges", [](sample_t& m) { m.legs[0] = -1; }), "legs[0] -1");
+  EXPECT_EQ(said("ranges", [](sample_t& m) { m.legs[5] = kMaxLegCount + 1; }),
+            fmt::format("legs[5] {}", kMaxLegCount + 1));
+  EXPECT_EQ(said("ranges", [](sample_t& m) { m.q[0] = NAN; }), "q[0] nan");
+  EXPECT_EQ(said("ranges", [](sample_t& m) { m.q[kMaxJoints - 1] = -2e3; }),
+            fmt::format("q[{}] -2000", kMaxJoints - 1));
+  EXPECT_EQ(said("ranges", [](sample_t& m) { m.faults = 8; }), "faults 8");
+  EXPECT_EQ(said("ranges", [](sample_t& m) { m.temperature = NAN; }), "temperature nan");
+  EXPECT_EQ(said("joints", [](sample_t& m) { m.q[6] = 0.5; }),
+            "q[6] 0.5 of a joint that is not there");
+  EXPECT_EQ(said("joints", [](sample_t& m) { m.q[0] = 10.0; }),
+            fmt::format("q[0] 10, limits [{:.4g}, {:.4g}]", s.joint_min[0], s.joint_max[0]));
+  // A stroke has two ends, of every leg; the ends themselves belong to it.
+  for (int i : {0, 5}) {
+    const auto at = [&](std::int64_t count) {
+      return broken([&, i = i](int, sample_t& m) {
+        m.legs[i] = static_cast<std::int32_t>(count);
+        return true;
+      });
+    };
+    EXPECT_EQ(at(s.leg_min[i]), Names());
+    EXPECT_EQ(at(s.leg_max[i]), Names());
+    EXPECT_EQ(at(s.leg_min[i] - 1), Names({"stroke"}));
+    EXPECT_EQ(at(s.leg_max[i] + 1), Names({"stroke"}));
+  }
 }
 
 TEST(Conform, SaysHowManyWereLostAndHowManyWereNotNewer) {

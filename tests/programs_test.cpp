@@ -303,6 +303,23 @@ TEST_F(Programs, RealTimeRunOfTwoProcesses) {
   EXPECT_NEAR(s["z_peak_to_peak_m"].get<double>(), 0.04, 1e-3);
   EXPECT_TRUE(s.contains("wake_up_late_median_s"));
 
+  // The table has them beside their ticks, and nothing where there are none.
+  const Series series = readSeries((folder_ / "a/run.lcmlog").string());
+  const std::vector<Column> table = columns(series.experiment);
+  const auto late =
+      std::find_if(table.begin(), table.end(), [](const Column& c) { return c.name == "late_s"; });
+  ASSERT_NE(late, table.end());
+  EXPECT_TRUE(series.rows.back().has_timing);
+  for (const Row& row : series.rows) {
+    if (row.has_timing)
+      EXPECT_EQ(late->value(row), 1e-9 * static_cast<double>(row.timing.late_ns));
+    else
+      EXPECT_TRUE(std::isnan(late->value(row)));
+  }
+  Row without = series.rows.back();
+  without.has_timing = false;
+  EXPECT_TRUE(std::isnan(late->value(without)));
+
   // The times of every tick add up, as the message's description says.
   LogReader reader((folder_ / "a/run.lcmlog").string());
   std::map<std::int64_t, sample_t> samples;
@@ -379,6 +396,24 @@ TEST_F(Programs, AFlightControllerHoldsASatelliteThatTurns) {
   EXPECT_LT(most, 2.5 * kDegree);
   EXPECT_GT(letGoOf(series).firings().size(), 3U);
   EXPECT_LT(summary(folder_ / "a")["emulation_error_attitude_share"].get<double>(), 0.01);
+}
+
+TEST_F(Programs, ARunNamesTheFilesThatItLeaves) {
+  for (const char* scenario : {"ramp", "contact_rebound_puma"}) {
+    const Output o = run(std::string(scenario) + " --lockstep" +
+                         (*scenario == 'r' ? "" : " --no-plots") + out(scenario));
+    ASSERT_EQ(o.status, 0) << o.text;
+    std::set<std::string> named, left;
+    const std::size_t folder = o.text.find(std::string("/") + scenario + "\n");
+    ASSERT_NE(folder, std::string::npos) << o.text;
+    std::istringstream words(o.text.substr(o.text.find('\n', folder)));
+    for (std::string word; words >> word && word != "see";)
+      named.insert(word.substr(0, word.find(',')));
+    for (const auto& entry : fs::directory_iterator(folder_ / scenario))
+      left.insert(entry.path().filename());
+    EXPECT_EQ(named, left) << o.text;
+    EXPECT_EQ(left.count("contacts.csv"), *scenario == 'c' ? 1U : 0U);
+  }
 }
 
 TEST_F(Programs, AStopLeavesItsLastSecondsAsALog) {

@@ -146,7 +146,8 @@ TEST_F(OnATerminal, TheMenuShowsWhereThePlatformIsWhileAPersonTypes) {
   person.until("calibrated  bias");
   person.until("holding");
   person.type("status\n");
-  person.until(R"(bias       of \d{4}-\d\d-\d\dT[^ ]*, 0\.0 h old)");
+  person.until(
+      R"(bias       of \d{4}-\d\d-\d\dT[^ ]*, 0\.0 h old, at [-0-9.]+ C; now [-0-9.]+ C\s)");
   person.type("quit\n");
   EXPECT_EQ(person.status(), 0) << person.shown();
   EXPECT_NE(person.shown().find("home, and done"), std::string::npos);

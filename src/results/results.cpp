@@ -64,7 +64,7 @@ std::string writeResults(const std::filesystem::path& folder, const RunResult& r
   writeSummary(summary, (folder / "summary.json").string());
   std::string out = table(summary) + "\n";
   for (const std::string& line : series.damage.lines()) out += fmt::format("  {}\n", line);
-  std::string files = "run.lcmlog, series.csv, summary.json";
+  std::string files = "experiment.yaml, run.lcmlog, series.csv, summary.json";
   if (series.experiment.plant.task.world) {
     writeContacts(contactPairs(series, e), (folder / "contacts.csv").string());
     files += ", contacts.csv";
