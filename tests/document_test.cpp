@@ -10,7 +10,10 @@
 
 #include "support/refusal.hpp"
 #include "support/rig.hpp"
+#include "ves/config/calibration.hpp"
 #include "ves/config/document.hpp"
+#include "ves/config/masses.hpp"
+#include "ves/config/servo.hpp"
 #include "ves/config/urdf.hpp"
 
 namespace ves {
@@ -242,6 +245,141 @@ TEST(UrdfLimits, WhatIsMonstrousIsRefusedInOneLine) {
   for (int i = 0; i < 60'000; ++i) wide += fmt::format(" a{}=\"\"", i);
   EXPECT_NE(said("<robot name=\"r\">" + deep).find("nested deeper than 64"), std::string::npos);
   EXPECT_NE(said(wide + "/>").find("has no link"), std::string::npos);
+}
+
+/// Numbers of which no two are alike.
+class Distinct {
+ public:
+  double next() { return value_ += 1.0 / 1024.0; }
+  template <int n>
+  Eigen::Matrix<double, n, 1> vector() {
+    Eigen::Matrix<double, n, 1> v;
+    for (double& one : v.reshaped()) one = next();
+    return v;
+  }
+
+ private:
+  double value_ = 0.5;
+};
+
+/// What stands under a key of a file that was saved.
+std::vector<double> standing(const Value& file, const std::string& key) {
+  std::vector<double> out;
+  const Value* value = file.find(key);
+  if (!value) return out;
+  if (value->kind == Value::Kind::kScalar) out.push_back(std::stod(value->text));
+  for (const Value& item : value->children) out.push_back(std::stod(item.text));
+  return out;
+}
+std::vector<double> numbers(const Eigen::Ref<const Eigen::VectorXd>& v) {
+  return {v.data(), v.data() + v.size()};
+}
+
+TEST(SavedFiles, HoldEveryFieldUnderItsOwnName) {
+  Distinct some;
+  constexpr std::int64_t kDate = 1'764'489'600;  // 2025-11-30T08:00:00Z
+  {
+    const CalibrationRecord r{
+        kDate, "0123abcd", some.next(), some.vector<6>(), some.vector<6>(), some.vector<6>()};
+    const Value file = parseDocument(write(r), "calibration.yaml");
+    EXPECT_EQ(file.find("date")->text, "2025-11-30T08:00:00Z");
+    EXPECT_EQ(file.find("setup")->text, r.setup);
+    EXPECT_EQ(standing(file, "temperature_c"), std::vector<double>{r.temperature});
+    EXPECT_EQ(standing(file, "bias_count"), numbers(r.bias));
+    EXPECT_EQ(standing(file, "deviation_count"), numbers(r.deviation));
+    EXPECT_EQ(standing(file, "standard_error_count"), numbers(r.standard_error));
+    const CalibrationRecord back = readCalibration(Section(file, ""));
+    EXPECT_EQ(back.date, r.date);
+    EXPECT_EQ(back.setup, r.setup);
+    EXPECT_EQ(back.temperature, r.temperature);
+    EXPECT_EQ(back.bias, r.bias);
+    EXPECT_EQ(back.deviation, r.deviation);
+    EXPECT_EQ(back.standard_error, r.standard_error);
+  }
+  {
+    MassRecord r{kDate, "4567ef", {}, 0.0};
+    for (int i = 0; i < 3; ++i) r.bodies.push_back({some.next(), some.vector<3>()});
+    for (const double deviation : {0.0, 0.125}) {
+      r.deviation = deviation;
+      const std::string text = write(r, "first line\n\nthird line");
+      EXPECT_EQ(text.rfind("# first line\n#\n# third line\n", 0), 0U) << text;
+      const Value file = parseDocument(text, "masses.yaml");
+      EXPECT_EQ(file.find("date")->text, "2025-11-30T08:00:00Z");
+      EXPECT_EQ(file.find("kinematics")->text, r.kinematics);
+      EXPECT_EQ(standing(file, "deviation"),
+                deviation > 0.0 ? std::vector<double>{deviation} : std::vector<double>());
+      const MassRecord back = readMasses(Section(file, ""));
+      EXPECT_EQ(back.date, r.date);
+      EXPECT_EQ(back.kinematics, r.kinematics);
+      EXPECT_EQ(back.deviation, deviation);
+      const std::vector<Value>& bodies = file.find("bodies")->children;
+      ASSERT_EQ(bodies.size(), r.bodies.size());
+      ASSERT_EQ(back.bodies.size(), r.bodies.size());
+      for (std::size_t i = 0; i < bodies.size(); ++i) {
+        EXPECT_EQ(standing(bodies[i], "mass_kg"), std::vector<double>{r.bodies[i].mass});
+        EXPECT_EQ(standing(bodies[i], "moment_kg_m"), numbers(r.bodies[i].moment));
+        EXPECT_EQ(back.bodies[i].mass, r.bodies[i].mass);
+        EXPECT_EQ(back.bodies[i].moment, r.bodies[i].moment);
+      }
+    }
+  }
+  {
+    struct PerLeg {
+      const char* key;
+      Vec6 ServoModel::*value;
+      double scale;
+    };
+    struct One {
+      const char* key;
+      double ServoModel::*value;
+      double scale;
+    };
+    const PerLeg legs[] = {
+        {"extend_per_s", &ServoModel::extend, 20.0}, {"retract_per_s", &ServoModel::retract, 10.0},
+        {"tau_s", &ServoModel::tau, 0.01},           {"delay_s", &ServoModel::delay, 1e-3},
+        {"opening_m", &ServoModel::opening, 2e-4},   {"friction_m", &ServoModel::friction, 1e-4}};
+    const One sensor[] = {{"sensor_delay_s", &ServoModel::sensor_delay, 1e-3},
+                          {"sensor_scale", &ServoModel::sensor_scale, 1.0}};
+    const One rubbing[] = {{"friction_s", &ServoModel::friction_time, 0.05},
+                           {"friction_way_m", &ServoModel::friction_way, 1e-4}};
+    ServoRecord r;
+    r.date = kDate;
+    for (const PerLeg& one : legs) {
+      r.servo.*one.value = one.scale * some.vector<6>();
+      r.deviation.*one.value = 0.01 * one.scale * some.vector<6>();
+    }
+    for (const One& one : sensor) {
+      r.servo.*one.value = one.scale * some.next();
+      r.deviation.*one.value = 0.01 * one.scale * some.next();
+    }
+    for (const One& one : rubbing) r.servo.*one.value = one.scale * some.next();
+    const Value file = parseDocument(write(r), "servo.yaml");
+    EXPECT_EQ(file.find("date")->text, "2025-11-30T08:00:00Z");
+    const ServoRecord back = readServo(Section(file, ""));
+    EXPECT_EQ(back.date, r.date);
+    const ServoModel nominal, model = withRecord(nominal, back);
+    for (const PerLeg& one : legs) {
+      const std::string deviation = std::string(one.key) + "_deviation";
+      EXPECT_EQ(standing(file, one.key), numbers(r.servo.*one.value)) << one.key;
+      EXPECT_EQ(standing(file, deviation), numbers(r.deviation.*one.value)) << one.key;
+      EXPECT_EQ(back.servo.*one.value, r.servo.*one.value) << one.key;
+      EXPECT_EQ(back.deviation.*one.value, r.deviation.*one.value) << one.key;
+      EXPECT_EQ(model.*one.value, r.servo.*one.value) << one.key;
+    }
+    const auto single = [&](const One& one) {
+      EXPECT_EQ(standing(file, one.key), std::vector<double>{r.servo.*one.value}) << one.key;
+      EXPECT_EQ(back.servo.*one.value, r.servo.*one.value) << one.key;
+      EXPECT_EQ(model.*one.value, r.servo.*one.value) << one.key;
+    };
+    for (const One& one : rubbing) single(one);
+    for (const One& one : sensor) {
+      single(one);
+      EXPECT_EQ(standing(file, std::string(one.key) + "_deviation"),
+                std::vector<double>{r.deviation.*one.value})
+          << one.key;
+      EXPECT_EQ(back.deviation.*one.value, r.deviation.*one.value) << one.key;
+    }
+  }
 }
 
 }  // namespace
