@@ -407,6 +407,37 @@ TEST_F(Sweep, RowIsWhatRunSaysOfTheSameValues) {
   }
 }
 
+// What the stability check says is found once for runs of one belief, and is right for each.
+TEST_F(Sweep, VerdictsAreThoseOfEachRunAlone) {
+  const std::string rest =
+      " --set legs.filters=outputs --set 'program=[{calibration: {}},{admittance: {duration_s: "
+      "1}}]' ";
+  ASSERT_EQ(sweep("srms_deploy_doss --vary plant_mismatch.mass=0.9,1.1 --vary seed=3,4 --vary "
+                  "base.keep_modes=2,6" +
+                  rest + out("s"))
+                .status,
+            0);
+  int refused = 0;
+  for (const auto& row : rows(folder_ / "s/sweep.csv")) {
+    std::string values = " --seed " + row.at("seed");
+    for (const char* key : {"plant_mismatch.mass", "base.keep_modes"})
+      values += std::string(" --set ") + key + "=" + row.at(key);
+    const test::Output o =
+        run("srms_deploy_doss --lockstep --no-plots --overwrite" + values + rest + out("r"));
+    EXPECT_EQ(o.status, row.at("ended") == "refused" ? 2 : 0) << o.text;
+    if (o.status != 0) {
+      ++refused;
+      const std::size_t why = o.text.find("the loop of"), end = o.text.find("; --force");
+      ASSERT_TRUE(why < end && end != std::string::npos) << o.text;
+      EXPECT_NE(csv("s").find(o.text.substr(why, end - why)), std::string::npos) << o.text;
+      continue;
+    }
+    for (const char* number : {"emulation_error_rms_m", "x_peak_to_peak_m"})
+      EXPECT_EQ(std::stod(row.at(number)), summary(folder_ / "r")[number].get<double>()) << number;
+  }
+  EXPECT_EQ(refused, 4);
+}
+
 TEST_F(Sweep, ProcessesOfMpirunShareTheRunsAndMeetInOneFile) {
   ASSERT_EQ(sweep(kRuns + out("one")).status, 0);
   const std::string folder = out("shared");

@@ -19,6 +19,7 @@
 #include <span>
 #include <stdexcept>
 
+#include "ves/core/memo.hpp"
 #include "ves/evaluation/summary.hpp"
 #include "ves/realtime/realtime.hpp"
 
@@ -76,9 +77,38 @@ std::string headerOf(const SweepPlan& plan) {
   return line;
 }
 
+/// What the stability check said, and what it makes of a controller.
+struct Judged {
+  std::string diverges;
+  Stability stability, uncompensated;
+  double stable_for, stable_for_uncompensated;
+};
+
+/// What runs share that differ in what neither belief nor base know of.
+struct Shared {
+  ReferenceMotions references;
+  Memo<std::string, Judged, 64> verdicts;
+};
+
+/// Of a run's values those that a controller knows of: the check looks at nothing else.
+std::string believed(const std::vector<std::string>& values) {
+  std::string out;
+  for (const std::string& one : values)
+    if (one.rfind("seed=", 0) != 0 && one.rfind("plant_mismatch", 0) != 0 &&
+        one.rfind("reality", 0) != 0)
+      out += one + "\n";
+  return out;
+}
+
+Judged judge(Experiment e) {
+  std::string diverges = applyStabilityCheck(e);
+  const ControllerConfig& c = e.controller;
+  return {std::move(diverges), c.stability, c.stability_uncompensated, c.stable_for,
+          c.stable_for_uncompensated};
+}
+
 /// One run, as its row.
-std::string rowOf(const SweepPlan& plan, const Value& scenario, std::int64_t run,
-                  ReferenceMotions& references) {
+std::string rowOf(const SweepPlan& plan, const Value& scenario, std::int64_t run, Shared& shared) {
   std::string row = fmt::format("{}", run);
   const std::vector<std::string> values = plan.overrides(run);
   for (const std::string& one : values)
@@ -88,13 +118,19 @@ std::string rowOf(const SweepPlan& plan, const Value& scenario, std::int64_t run
     Value document = scenario;
     plan.put(values, document);
     Experiment e = buildExperiment(std::move(document), {});
-    const std::string diverges =
-        wantsAdmittance(e.controller.program) ? applyStabilityCheck(e) : std::string();
-    if (e.controller.stability == Stability::kUnstable)
-      return row + ",refused," + csvField(diverges) + "," + rest;
+    if (wantsAdmittance(e.controller.program)) {
+      const auto known = shared.verdicts.of(believed(values), [&] { return judge(e); });
+      if (known->stability == Stability::kUnstable)
+        return row + ",refused," + csvField(known->diverges) + "," + rest;
+      ControllerConfig& c = e.controller;
+      c.stability = known->stability;
+      c.stability_uncompensated = known->uncompensated;
+      c.stable_for = known->stable_for;
+      c.stable_for_uncompensated = known->stable_for_uncompensated;
+    }
     const RecordedRun recorded = recordLockstep(e);
     const RunResult& result = recorded.result;
-    const auto summary = summarise(recorded.series, result, references);
+    const auto summary = summarise(recorded.series, result, shared.references);
     row += fmt::format(",{},{},{}", result.aborted ? "aborted" : name(result.phase),
                        name(result.cause), result.cause_tick);
     for (const char* number : kNumbers)
@@ -238,7 +274,7 @@ class Runner {
     workers_.execute([&] {
       tbb::parallel_for_each(runs.begin(), runs.end(), [&](std::int64_t run) {
         if (stop_()) return;
-        const std::string row = rowOf(plan_, scenario_, run, references_);
+        const std::string row = rowOf(plan_, scenario_, run, shared_);
         const std::lock_guard lock_rows(writing_);
         out_ << row << '\n' << std::flush;
         if (!out_) throw InputError(file_.string() + ": cannot be written");
@@ -260,7 +296,7 @@ class Runner {
   const std::function<void(const SweepProgress&)>& shown_;
   const std::function<bool()>& stop_;
   tbb::task_arena workers_;
-  ReferenceMotions references_;
+  Shared shared_;
   std::mutex writing_;
   SweepProgress progress_;
   const std::int64_t start_ = monotonicNow();
