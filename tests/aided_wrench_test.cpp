@@ -268,6 +268,44 @@ TEST(JointMomentum, ScattersAsItsReadingsAreBelievedTo) {
   }
 }
 
+// So many readings that their scatter and a steady jerk put the speed at their end off alike: both
+// by a fit of its own.
+TEST(JointParabola, IsLaidThroughAsManyReadingsAsNoiseAndJerkAskFor) {
+  ControllerConfig c = config({"sensor.readings_per_tick=4"});
+  int most = 0;
+  for (const double period : {0.01, 0.02})
+    for (const double scatter : {1e-6, 1e-5, 1e-4, 1e-3})
+      for (const double jerk : {3.0, 30.0, 300.0}) {
+        c.joints.interval = period;
+        c.joints.deviation.setConstant(scatter);
+        c.compensation.joint_jerk = jerk;
+        // Of a parabola through n readings, the newest at 0: the speed there of 1/6 jerk t^3 and of
+        // readings that scatter.
+        const auto offBy = [&](int n) {
+          Eigen::MatrixXd powers(n, 3);
+          Eigen::VectorXd cubic(n);
+          for (int i = 0; i < n; ++i) {
+            const double t = -i * period;
+            powers.row(i) << 1.0, t, t * t;
+            cubic(i) = jerk * t * t * t / 6.0;
+          }
+          const Eigen::MatrixXd fit =
+              powers.colPivHouseholderQr().solve(Eigen::MatrixXd::Identity(n, n));
+          return std::pair(std::abs(fit.row(1).dot(cubic)), scatter * fit.row(1).norm());
+        };
+        const int n = JointParabola(c).readings;
+        SCOPED_TRACE(fmt::format("{} s, {} rad, {} rad/s^3: {}", period, scatter, jerk, n));
+        most = std::max(most, n);
+        if (n < JointParabola::kMost) {
+          EXPECT_GT(offBy(n).first, 0.7 * offBy(n).second);
+        }
+        if (n > 3) {
+          EXPECT_LT(offBy(n - 1).first, 1.4 * offBy(n - 1).second);
+        }
+      }
+  EXPECT_GT(most, 20);
+}
+
 // The gate
 
 // Means of the simulated sensor's readings scatter as the filter's model foretells.

@@ -310,6 +310,7 @@ TEST_F(Programs, RealTimeRunOfTwoProcesses) {
       std::find_if(table.begin(), table.end(), [](const Column& c) { return c.name == "late_s"; });
   ASSERT_NE(late, table.end());
   EXPECT_TRUE(series.rows.back().has_timing);
+  EXPECT_EQ(series.rows.front().t, 0.0);
   for (const Row& row : series.rows) {
     if (row.has_timing)
       EXPECT_EQ(late->value(row), 1e-9 * static_cast<double>(row.timing.late_ns));

@@ -188,6 +188,23 @@ TEST(SensorBias, ATareEndsAtTheMeanWithoutAStepAndTakesItsRamp) {
   EXPECT_LT((bias.counts() - after).norm(), 1e-9);
 }
 
+TEST(SensorBias, WhatWasLearntIsKeptWhenATareBegins) {
+  SensorBias bias(puma());
+  const Vec6 learnt = (Vec6() << 1, -2, 3, -4, 5, -6).finished(), found = bias.found();
+  bias.learn(learnt);
+  const Vec6 counts = bias.counts();
+  EXPECT_EQ(counts, found + learnt);
+  bias.beginTare();
+  EXPECT_EQ(bias.counts(), counts);
+  EXPECT_EQ(bias.found(), found + learnt);
+  EXPECT_TRUE(bias.learnt().isZero(0.0));
+  bias.learn(learnt);  // not during a tare
+  EXPECT_EQ(bias.counts(), counts);
+  bias.cancelTare();
+  bias.learn(learnt);
+  EXPECT_EQ(bias.counts(), counts + learnt);
+}
+
 TEST(SensorBias, ATareAveragesNewSamplesOnlyAndRefusesALoad) {
   ControllerConfig config = puma();
   SensorBias bias(config);

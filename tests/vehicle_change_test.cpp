@@ -204,6 +204,32 @@ TEST(VehicleChange, ThatIsFinishedTakesAndOwesNothing) {
   }
 }
 
+// Every factor is as far on its way as the others, from where it was.
+TEST(VehicleChange, FactorsGoTogether) {
+  const VehicleMatrices m = matrices(false);
+  AdmittanceModel model(modesOf(m.M, m.C, m.K), kTickSeconds);
+  model.become({2.0, 0.5, 4.0});
+  model.reset(Vec6::Constant(0.03));
+  VehicleChange change(kTickSeconds, 10.0);
+  change.begin({{5.0, 1.5, 2.0}, 1.0}, model);
+  int between = 0;
+  double before = 0.0;
+  for (int k = 0; k < 400; ++k) {
+    change.advance(model);
+    model.step({}, change.damping());
+    change.pay(model.damped());
+    const VehicleFactors& f = model.factors();
+    const double share = (f.mass - 2.0) / 3.0;
+    EXPECT_NEAR(f.damping - 0.5, share * 1.0, 1e-12);
+    EXPECT_NEAR(f.stiffness - 4.0, share * -2.0, 1e-12);
+    EXPECT_GE(share, before);
+    before = share;
+    between += share > 0.0 && share < 1.0;
+  }
+  EXPECT_GT(between, 50);
+  EXPECT_EQ(before, 1.0);
+}
+
 TEST(VehicleChange, ArrivesInItsTimeWhereTheVehicleSwings) {
   const VehicleMatrices m = matrices(false);
   AdmittanceModel model(modesOf(m.M, m.C, m.K), kTickSeconds);

@@ -134,7 +134,13 @@ class Finder:
 
         if (a := sides(one)) and (b := sides(two)):
             (to, of), (to_2, of_2) = a.groups(), b.groups()
-            return to in of_2 or to_2 in of or to.startswith(to_2) or to_2.startswith(to)
+            def named(whole, text):
+                return re.search(rf"(?<![\w.]){re.escape(whole)}(?!\w)", text)
+
+            def within(whole, part):  # or the same
+                return part == whole or part.startswith((whole + ".", whole + "["))
+
+            return named(to, of_2) or named(to_2, of) or within(to, to_2) or within(to_2, to)
 
         def names(text):
             return set(re.findall(r"[A-Za-z_]\w{2,}", text)) - {"std", "Zero", "move"}
