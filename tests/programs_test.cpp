@@ -399,6 +399,34 @@ TEST_F(Programs, AFlightControllerHoldsASatelliteThatTurns) {
   EXPECT_LT(summary(folder_ / "a")["emulation_error_attitude_share"].get<double>(), 0.01);
 }
 
+TEST_F(Programs, ARunWhoseLogFindsNoRoomGoesHomeAndSaysWhatIsLost) {
+  const Output o = sh("ulimit -f 800; " + app("run") + "z_sine --private-bus --no-plots " +
+                      patient() + " --set '" + kShortProgram + "'" + out("a"));
+  EXPECT_EQ(o.status, 2) << o.text;
+  const std::string log = (folder_ / "a/run.lcmlog").string();
+  const std::string warning =
+      "warning: " + log + ": File too large; events of the log are being lost, the run goes on";
+  const std::size_t once = o.text.find(warning);
+  EXPECT_NE(once, std::string::npos) << o.text;
+  EXPECT_EQ(o.text.find("events of the log are being lost", once + warning.size()),
+            std::string::npos)
+      << o.text;
+  EXPECT_NE(o.text.find("parked"), std::string::npos) << o.text;
+  // Of every tick a sample, a state, a command and a truth: what is not there was lost.
+  const auto s = summary(folder_ / "a");
+  const auto lost = s["log_events_lost"].get<std::int64_t>();
+  EXPECT_EQ(s["log_trouble"], "File too large");
+  EXPECT_NE(o.text.find(fmt::format("run.lcmlog: File too large: {} events of the log lost", lost)),
+            std::string::npos)
+      << o.text;
+  std::int64_t states = 0;
+  LogReader reader(log);
+  for (LogEvent event; reader.next(event);) states += event.channel == channel::kState;
+  const auto ticks = s["ticks"].get<std::int64_t>();
+  EXPECT_LT(states, ticks);
+  EXPECT_GE(lost, 3 * (ticks - states));  // a few may not have come at all
+}
+
 TEST_F(Programs, ARunNamesTheFilesThatItLeaves) {
   for (const char* scenario : {"ramp", "contact_rebound_puma"}) {
     const Output o = run(std::string(scenario) + " --lockstep" +
