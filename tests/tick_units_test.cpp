@@ -284,6 +284,34 @@ TEST(RobotInertia, IsMassTimesAccelerationOfAPlatformThatSlides) {
             0.0);
 }
 
+// What the platform carries is turned as the platform is, what is emulated as the vehicle is.
+TEST(RobotInertia, OfAVehicleThatIsTurnedOtherwiseThanThePlatform) {
+  ControllerConfig config = puma();
+  config.compensation.inertia = config.compensation.observer = true;
+  RobotInertia inertia(config);
+  const KnownPayload known(config);
+  const Geometry& g = config.geometry;
+  const JointVector q = JointVector::Zero();
+  const Mat6 M_P = spatialMass(lockedRobot(config.payload, q));
+  const auto turned = [&](const Mat3& R) {
+    Mat6 T = Mat6::Zero();
+    T.topLeftCorner<3, 3>() = T.bottomRightCorner<3, 3>() = R;
+    return Mat6(T * M_P * T.transpose());
+  };
+  Mat3 before = Mat3::Identity();
+  for (int k = 0; k < 3; ++k) {
+    const Mat3 R_IP = rotation({0.05 * k, -0.1, 0.02}), R_EP = rotation({0.4, 0.3 * k, -0.7});
+    const BodyMotion P{{R_IP, g.home()}, Vec3::Zero(), Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};
+    inertia.update(known, k, q, 0.01, P.X, R_EP, legMotion(g, P), true, 1.0);
+    EXPECT_LT((inertia.M_1() - turned(R_IP)).norm(), 1e-9 * M_P.norm()) << k;
+    const CarriedBody carried = inertia.carried(Vec6::Zero());
+    EXPECT_EQ(carried.R_IP, R_EP) << k;
+    EXPECT_LT((carried.M_1 - turned(R_EP)).norm(), 1e-9 * M_P.norm()) << k;
+    EXPECT_EQ(carried.R_IP_before, k == 0 ? R_EP : before) << k;
+    before = R_EP;
+  }
+}
+
 TEST(StaticLoad, GoesThroughTheSensorsFilterByTheShareOnly) {
   ControllerConfig config = puma();
   config.compensation.inertia = config.compensation.observer = true;
