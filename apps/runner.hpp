@@ -67,7 +67,7 @@ inline LaunchOptions prepareFolder(RunnerOptions& options, const Experiment& exp
   if (!options.overwrite)
     requireWithout(folder, options.out,
                    {"run.lcmlog", "experiment.yaml", "series.csv", "summary.json", "contacts.csv",
-                    "belief.yaml", "commission.html"});
+                    "masses.yaml", "belief.yaml", "commission.html"});
   LaunchOptions launch;
   launch.program = ownProgram();
   launch.scenario = folder / "experiment.yaml";

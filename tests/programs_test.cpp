@@ -170,7 +170,7 @@ TEST_F(Programs, WhatIsSomethingElseIsKept) {
                 0)
           << name;
   std::filesystem::create_directory(folder_ / "b");
-  for (const char* name : {"belief.yaml", "summary.json", "series.csv"}) {
+  for (const char* name : {"belief.yaml", "masses.yaml", "summary.json", "series.csv"}) {
     std::filesystem::rename(text, file("b/") + name);
     for (const char* command : {"run", "commission"})
       expectRefusal(app(command) + "puma_on_table_4_1 --lockstep --quiet" + out("b"),
