@@ -19,9 +19,11 @@ using Eigen::VectorXd;
 
 /// Leg and sensor of one direction, between two updates: x' = A x + B v_end, where v_end is the
 /// speed that the valve's current leads to. x = {length, speed, what the valve has let in, its rate
-/// and what of it pressure feedback takes for lasting (3), v_end behind the pressures that it leads
-/// to, Filter 3 (3), sensor (2)}. A machine that gives way follows its oil as
+/// and what of it pressure feedback takes for lasting (3), z, Filter 3 (3), sensor (2)}. A machine
+/// that gives way follows its oil as
 ///   length'' = w^2 (oil - length) - 2 zeta w length'
+/// and a leg that has just turned is quicker by r for a while T:
+///   tau v' = r v_end + (1 - r) z - v,  T z' = v_end - z
 struct Mechanics {
   static constexpr Index kSize = 11, kLength = 0, kSpeed = 1, kOil = 2, kTurned = 5, kFilter = 6,
                          kSensor = 9;

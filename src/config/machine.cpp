@@ -252,7 +252,7 @@ MachinePieces readMachine(Section s, std::int64_t controller_period, Resonance& 
       told.fail("lowest_hz",
                 "nothing gives way here, want it above 0 beside damping_ratio or "
                 "pressure_feedback_per_s");
-    if (told.has("turning_gain"))  // logs of 2026 have none
+    if (told.has("turning_gain"))  // older logs have none
       resonance.turning = told.numberOr("turning_gain", 0.5, 2.0, resonance.turning);
     told.finish();
   }

@@ -106,9 +106,8 @@ struct Resonance {
   double feedback_time = 0.03;  // [s] of its high-pass
   // A leg that has just turned is quicker until its two chambers have the pressures of the other
   // direction (four-way valves).
-  double turning = 1.0;  // [-] its speed, over the one that it comes to
-  double turning_time =
-      0.1;  // [s] until it does: less the larger the swing; the gate tries several
+  double turning = 1.0;       // [-] its speed, over the one that it comes to
+  double turning_time = 0.1;  // [s] until it does; the gate tries several
 };
 
 /// What the controller takes the machine, its load and the vehicle for: from data sheets,
