@@ -199,12 +199,18 @@ py::dict loopMargins(const Path& file, const Strings& overrides) {
   out["stable"] = verdict.stable;
   out["why"] = verdict.stable ? "" : explain(verdict);
   if (!verdict.stable) return out;
-  const Margins a = margins(verdict.extending), b = margins(verdict.retracting);
-  out["inertia"] = std::min(a.gain, b.gain);
-  out["servo_gain"] = std::min(a.servo_gain, b.servo_gain);
-  out["early"] = std::min(a.early, b.early);
-  out["late"] = std::min(a.late, b.late);
-  out["delay"] = std::min(a.delay, b.delay);
+  Margins least{HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL, Margins::kMostDelay};
+  for (const Direction direction : directionsOf(e.controller)) {
+    const Margins m = margins(verdict.at(direction));
+    least = {std::min(least.gain, m.gain), std::min(least.servo_gain, m.servo_gain),
+             std::min(least.early, m.early), std::min(least.late, m.late),
+             std::min(least.delay, m.delay)};
+  }
+  out["inertia"] = least.gain;
+  out["servo_gain"] = least.servo_gain;
+  out["early"] = least.early;
+  out["late"] = least.late;
+  out["delay"] = least.delay;
   return out;
 }
 

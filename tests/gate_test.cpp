@@ -53,7 +53,7 @@ TEST(Gate, LooksAtLegsThatHardlyMoveWhereTheirValvesAreOpen) {
   EXPECT_DOUBLE_EQ(null.model.servo.extend(0), up + down);
   const LoopVerdict open = assessStability(e.controller, e.plant.task);
   EXPECT_GE(open.worst.radius, shut.worst.radius);
-  EXPECT_EQ(open.near_null.velocity_gain, up + down);
+  EXPECT_EQ(open.at(Direction::kNearNull).velocity_gain, up + down);
   // What one of three directions does is in the verdict: the sum of both gains alone is refused.
   const auto stable = [&](double gain) {
     Experiment more = e;
@@ -179,7 +179,7 @@ TEST(Gate, ItsWorstDirectionIsThatOfTheFasterLegs) {  // the servo that follows 
                                                "legs.gain_retract_in_per_s_per_ma=" + retract});
     const LoopVerdict v = assessStability(e.controller, e.plant.task);
     EXPECT_TRUE(v.stable);
-    const Loop& loop = v.direction == Direction::kExtending ? v.extending : v.retracting;
+    const Loop& loop = v.at(v.direction);
     EXPECT_NEAR(v.worst.radius, radius(loop), 1e-9);
     return v.direction;
   };

@@ -178,11 +178,7 @@ LoopVerdict assessStability(const ControllerConfig& controller, const RobotTask&
   double largest = 0.0;
   for (const Direction direction : directionsOf(controller)) {
     double most = 0.0;
-    Loop& kept = direction == Direction::kExtending    ? out.extending
-                 : direction == Direction::kRetracting ? out.retracting
-                 : direction == Direction::kTurning    ? out.turning
-                 : direction == Direction::kSwinging   ? out.swinging
-                                                       : out.near_null;
+    Loop& kept = out.loops[static_cast<std::size_t>(direction)];
     for (const Loop& loop : loopsOf(controller, task.initial_joints, direction)) {
       for (const CarriedRobot& robot : robots) {
         const Loop with = carrying(loop, robot);
@@ -267,7 +263,7 @@ std::string explain(const LoopVerdict& v) {
   if (v.K_P > 0.0) add(fmt::format("{:.0f} percent of K_P", 100.0 * v.K_P));
   if (v.sensor_cutoff > 0.0) {
     std::string one;
-    if (v.sensor_cutoff < v.extending.sensor_cutoff)
+    if (v.sensor_cutoff < v.at(Direction::kExtending).sensor_cutoff)
       one = fmt::format("a sensor cutoff of {:.3g} Hz", v.sensor_cutoff / (2.0 * M_PI));
     if (v.feedback > 0.0)
       one +=
@@ -277,7 +273,7 @@ std::string explain(const LoopVerdict& v) {
   if (cure.empty())
     cure = v.worst.frequency > 0.0 ? "a lighter robot or a heavier base"
                                    : "a lighter or lower robot, or a stiffer base";
-  const double gives = v.extending.resonance.frequency / (2.0 * M_PI);
+  const double gives = v.at(Direction::kExtending).resonance.frequency / (2.0 * M_PI);
   return fmt::format(
       "the loop of base, robot and machine{} would diverge: {}, most in {} (legs {}). What cures "
       "it: {}",

@@ -26,14 +26,8 @@ struct LoopVerdict {
   DominantRoot at_off;           // and what grows there
   DominantRoot worst;
   Direction direction = Direction::kExtending;
-  Loop extending, retracting, near_null, turning, swinging;  // in the pose where each is worst
-  const Loop& at(Direction which) const {
-    return which == Direction::kExtending    ? extending
-           : which == Direction::kRetracting ? retracting
-           : which == Direction::kTurning    ? turning
-           : which == Direction::kSwinging   ? swinging
-                                             : near_null;
-  }
+  std::array<Loop, kDirections> loops;  // of directionsOf(), in the pose where each is worst
+  const Loop& at(Direction which) const { return loops[static_cast<std::size_t>(which)]; }
   int modes = 0;              // [-] kept
   int stable_modes = 0;       // [-] that could be
   double damping_ratio = 0;   // [-] that every mode would need; 0: none up to 1 helps

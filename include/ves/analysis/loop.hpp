@@ -25,6 +25,7 @@
 // a tilting robot, which the controller compensates.
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <vector>
 
@@ -95,6 +96,7 @@ Loop off(Loop loop, const Uncertainty& by, int timing, int gain);
 /// the loop is judged as if neither were there. Legs that swing are a loop of their own where they
 /// are quicker after a turn (Resonance::turning).
 enum class Direction { kExtending, kRetracting, kSwinging, kNearNull, kTurning };
+inline constexpr std::size_t kDirections = 5;
 const char* name(Direction direction);
 
 /// Those for which a loop is judged: both ways, and hardly moving where that is another loop.
