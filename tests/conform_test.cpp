@@ -99,7 +99,7 @@ TEST(Conform, SaysWhichValueIsOutOfRange) {
   // A stroke has two ends, of every leg; the ends themselves belong to it.
   for (int i : {0, 5}) {
     const auto at = [&](std::int64_t count) {
-      return broken([&, i = i](int, sample_t& m) {
+      return broken([&](int, sample_t& m) {
         m.legs[i] = static_cast<std::int32_t>(count);
         return true;
       });

@@ -117,11 +117,12 @@ TEST(Examination, ReadsWhatTheShellSays) {
   EXPECT_EQ(m.socket_buffer, std::atol(standing("/proc/sys/net/core/rmem_max").c_str()));
   EXPECT_EQ(m.clock_source,
             standing("/sys/devices/system/clocksource/clocksource0/current_clocksource"));
-  EXPECT_EQ(std::to_string(m.priority_limit), said("ulimit -r"));
-  const std::string lock = said("ulimit -l");
-  if (lock != "unlimited") {
-    EXPECT_EQ(std::to_string(m.lock_limit / 1024), lock);
-  }
+  const auto limit = [&](const char* option, std::uint64_t unit) {
+    const std::string text = said(std::string("ulimit ") + option);
+    return text == "unlimited" ? UINT64_MAX / unit : std::stoull(text);
+  };
+  EXPECT_EQ(m.priority_limit, limit("-r", 1));
+  EXPECT_EQ(m.lock_limit / 1024, limit("-l", 1024));
   EXPECT_EQ(m.fifo, test::sh("chrt -f 80 true").status == 0);
 }
 

@@ -11,6 +11,7 @@
 
 #include "support/programs.hpp"
 #include "support/robots.hpp"
+#include "ves/series/series.hpp"
 
 namespace ves {
 namespace {
@@ -84,17 +85,13 @@ class Pictures : public test::Programs {
     EXPECT_EQ(ran.status, 0) << ran.text;
     DrawnRun d{{}, picturesIn(test::readText(file("script")))};
     std::istringstream rows(test::readText(file("run/series.csv")));
-    std::vector<std::string> names;
-    for (std::string row; std::getline(rows, row);) {
-      std::istringstream cells(row);
-      std::size_t k = 0;
-      for (std::string cell; std::getline(cells, cell, ','); ++k)
-        if (names.size() <= k && d.table.empty())
-          names.push_back(cell);
-        else
-          d.table[names.at(k)].push_back(numberIn(cell));
-      if (d.table.empty())
-        for (const std::string& name : names) d.table[name];
+    std::string row;
+    std::getline(rows, row);
+    const std::vector<std::string> names = csvFields(row);
+    while (std::getline(rows, row)) {
+      const std::vector<std::string> cells = csvFields(row);
+      for (std::size_t k = 0; k < names.size(); ++k)
+        d.table[names[k]].push_back(numberIn(cells.at(k)));
     }
     return d;
   }
@@ -141,7 +138,7 @@ class Pictures : public test::Programs {
   }
 };
 
-std::string lettersOf(const std::map<std::string, Picture>& pictures) {
+std::string filesOf(const std::map<std::string, Picture>& pictures) {
   std::string out;
   for (const auto& [name, picture] : pictures) out += name + " ";
   return out;
@@ -149,7 +146,7 @@ std::string lettersOf(const std::map<std::string, Picture>& pictures) {
 
 TEST_F(Pictures, ShowWhatTheTableSays) {
   const DrawnRun d = drawn("contact_board_puma --set controller.passivity.enabled=true");
-  EXPECT_EQ(lettersOf(d.pictures), "contact.png error.png legs.png pose.png tool.png wrench.png ");
+  EXPECT_EQ(filesOf(d.pictures), "contact.png error.png legs.png pose.png tool.png wrench.png ");
   const auto value = [&](const std::string& name) {
     EXPECT_EQ(d.table.count(name), 1u) << name;
     return d.table.at(name);
@@ -187,7 +184,6 @@ TEST_F(Pictures, ShowWhatTheTableSays) {
   expectCurve(d, "contact.png", "energy [mJ]", "put in", times("energy_put_in_j", 1e3));
   expectCurve(d, "contact.png", "energy [mJ]", "damped away", times("energy_paid_j", 1e3));
   // Each begins where there is something to be seen: the program, and wrenches without the bias.
-  const std::vector<double> t = value("t_s"), kind = value("segment");
   EXPECT_LT(d.pictures.at("pose.png").from, 0.2);
   EXPECT_EQ(d.pictures.at("pose.png").to, d.pictures.at("wrench.png").to);
   EXPECT_NEAR(d.pictures.at("wrench.png").from, 2.12,
