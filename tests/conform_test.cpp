@@ -4,6 +4,7 @@
 #include "ves/doctor/conform.hpp"
 #include "ves/run/announcer.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <fstream>

@@ -10,7 +10,9 @@
 #include "support/rig.hpp"
 #include "ves/analysis/gate.hpp"
 #include "ves/analysis/loop.hpp"
+#include "ves/evaluation/comparison.hpp"
 #include "ves/run/run.hpp"
+#include "ves/series/series.hpp"
 #include "ves/srms/modes.hpp"
 
 namespace ves {

@@ -4,17 +4,23 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <functional>
 #include <map>
 #include <regex>
 #include <sstream>
 
 #include "support/programs.hpp"
-#include "support/robots.hpp"
+#include "support/rig.hpp"
 #include "ves/series/series.hpp"
 
 namespace ves {
 namespace {
+
+namespace fs = std::filesystem;
 
 struct Points {
   std::vector<double> t, y;
