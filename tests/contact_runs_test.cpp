@@ -311,8 +311,8 @@ TEST(ContactInFreeSpace, DampingGoesByTheRateOfTheDepth) {
   EXPECT_GT(turned, 5e-3);
 }
 
-// A base too heavy to move is a platform that is held: the plant's steps against GSL's, which stop
-// where the contact begins and ends.
+// A base too heavy to move is a platform that is held: the plant's steps against adaptive ones, which
+// stop where the contact begins and ends.
 TEST(ContactInThePlant, IsThatOfAnIndependentIntegration) {
   for (const double k : {3e3, 1e4, 3e5})
     for (const std::string& law : {std::string(), std::string(", exponent: 1.5"),

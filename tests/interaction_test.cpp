@@ -32,9 +32,10 @@ TEST(Interaction, AugmentedMassIsTheModalMassOfBaseAndRobot) {  // (3.11)
   const MatrixXd expected =
       MatrixXd::Identity(8, 8) + std::get<ModalModel>(i.vehicle.kind).Phi.transpose() *
                                      spatialMass(robot) * std::get<ModalModel>(i.vehicle.kind).Phi;
-  EXPECT_LT(
-      (augmentedModalMass(std::get<ModalModel>(i.vehicle.kind), robot) - expected).cwiseAbs().maxCoeff(),
-      1e-12);
+  EXPECT_LT((augmentedModalMass(std::get<ModalModel>(i.vehicle.kind), robot) - expected)
+                .cwiseAbs()
+                .maxCoeff(),
+            1e-12);
 }
 
 /// Kinetic energy of base and rigid robot, and what the base's springs hold.
@@ -42,9 +43,9 @@ double energy(const Interaction& i, const InteractionPoint& p, const RigidBody& 
               const BodyMotion& P) {
   const Vec6 twist = (Vec6() << P.v, P.w).finished();
   const Mat6 M = spatialMass(rotated(P.X.R, robot_P));
-  return 0.5 *
-         (p.eta_dot.squaredNorm() +
-          std::get<ModalModel>(i.vehicle.kind).stiffness.dot(p.eta.cwiseAbs2()) + twist.dot(M * twist));
+  return 0.5 * (p.eta_dot.squaredNorm() +
+                std::get<ModalModel>(i.vehicle.kind).stiffness.dot(p.eta.cwiseAbs2()) +
+                twist.dot(M * twist));
 }
 
 BodyMotion platform(const InteractionPoint& p) {
@@ -255,6 +256,38 @@ TEST(Interaction, KeepingTheMassForNStepsErrsInProportionToN) {  // the report's
   const double one = error(1), ten = error(10);
   EXPECT_GT(one, 0.0);
   EXPECT_NEAR(ten / one, 10.0, 3.0);
+}
+
+// Two methods, and points that no step ends at: a robot that moves, is pushed and stands.
+TEST(Interaction, LongStepsAgreeWithShortOnes) {
+  for (const char* scenario : {"srms_capture_doss", "puma_on_table_4_1"}) {
+    Interaction i = interaction(scenario);
+    Push push;
+    push.force_I = {20.0, -10.0, 5.0};
+    push.duration = 0.3337;
+    i.actions = {{0, RobotMove{0, 0.3, 1.0}},
+                 {503'000'123, RobotMove{1, -0.2, 0.7}},
+                 {2'100'000'001, push},
+                 {2'222'222'222, RobotMove{0, -0.3, 0.5}}};
+    InteractionOptions options;
+    options.model = InteractionModel::kWhole;
+    options.duration = 4'004'000'000;  // no multiple of the step
+    const std::vector<InteractionPoint> free = simulate(i, options);
+    options.hold_mass = 1;  // of no meaning here, but that each step is for itself
+    options.tolerance = 1e-12;
+    const std::vector<InteractionPoint> stepwise = simulate(i, options);
+    ASSERT_EQ(free.size(), 401u);
+    ASSERT_EQ(stepwise.size(), 401u);
+    double moved = 0.0;
+    for (std::size_t k = 0; k < free.size(); ++k) {
+      EXPECT_EQ(free[k].t, stepwise[k].t);
+      EXPECT_NEAR(free[k].t, 0.01 * static_cast<double>(k), 1e-12);
+      ASSERT_LT((free[k].x - stepwise[k].x).norm(), 1e-9) << scenario << " " << k;
+      ASSERT_LT((free[k].x_dot - stepwise[k].x_dot).norm(), 1e-8) << scenario << " " << k;
+      moved = std::max(moved, free[k].x.norm());
+    }
+    EXPECT_GT(moved, 1e-3);
+  }
 }
 
 TEST(Interaction, SaysWhenTheToleranceCannotBeKept) {

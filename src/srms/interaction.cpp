@@ -2,6 +2,7 @@
 #include "ves/srms/interaction.hpp"
 
 #include <algorithm>
+#include <boost/numeric/odeint/stepper/bulirsch_stoer_dense_out.hpp>
 #include <boost/numeric/odeint/stepper/controlled_runge_kutta.hpp>
 #include <boost/numeric/odeint/stepper/runge_kutta_cash_karp54.hpp>
 #include <stdexcept>
@@ -79,6 +80,10 @@ class Equations {
     }
   }
 
+  /// Whether an interval ends with the step: something is held for its length, or may touch.
+  bool holdsAStep() const {
+    return hasWorld() || each([](const auto& v) { return v.holdsAStep(); });
+  }
   /// [ns] when the push ends that lasts now; `otherwise`: none does.
   std::int64_t pushEnds(std::int64_t otherwise) const {
     return pushing() ? std::min(otherwise, push_->end()) : otherwise;
@@ -183,6 +188,25 @@ class Equations {
   mutable RigidBody composite_L0_;
 };
 
+struct Diverges {};
+
+using State = std::vector<double>;
+
+State stateOf(const VectorXd& y) { return {y.begin(), y.end()}; }
+VectorXd vectorOf(const State& state) {
+  return VectorXd::Map(state.data(), static_cast<Eigen::Index>(state.size()));
+}
+
+struct Rates {
+  const Equations* equations;
+  void operator()(const State& y, State& y_dot, double t) const {
+    VectorXd rates(static_cast<Eigen::Index>(y.size()));
+    equations->derivative(t, vectorOf(y), rates);
+    if (!rates.allFinite()) throw Diverges();
+    VectorXd::Map(y_dot.data(), rates.size()) = rates;
+  }
+};
+
 /// Runge and Kutta's steps, of fifth order as Cash and Karp have it, as long as the tolerance lets
 /// them be.
 class Solver {
@@ -206,7 +230,7 @@ class Solver {
       length_ = taken && last ? std::max(length_, length) : length;
       if (!taken && now + length_ > now) continue;
       if (!taken) throw Diverges();
-      y = VectorXd::Map(state.data(), y.size());
+      y = vectorOf(state);
       return last ? until : then;
     }
   }
@@ -215,32 +239,52 @@ class Solver {
   void leap(double now, double length, VectorXd& y) {
     State state = stateOf(y);
     Stepper().do_step(rates_, state, now, length);
-    y = VectorXd::Map(state.data(), y.size());
+    y = vectorOf(state);
   }
 
-  struct Diverges {};
-
  private:
-  using State = std::vector<double>;
   using Stepper = odeint::runge_kutta_cash_karp54<State>;
   using Checker =
       odeint::default_error_checker<double, odeint::range_algebra, odeint::default_operations>;
-  struct Rates {
-    const Equations* equations;
-    void operator()(const State& y, State& y_dot, double t) const {
-      const auto n = static_cast<Eigen::Index>(y.size());
-      VectorXd rates(n);
-      equations->derivative(t, VectorXd::Map(y.data(), n), rates);
-      if (!rates.allFinite()) throw Diverges();
-      VectorXd::Map(y_dot.data(), n) = rates;
-    }
-  };
-
-  static State stateOf(const VectorXd& y) { return {y.begin(), y.end()}; }
 
   Rates rates_;
   odeint::controlled_runge_kutta<Stepper, Checker> controlled_;
   double length_ = 1e-3;  // [s]
+};
+
+/// Bulirsch and Stoer's steps, many times as long, and what is asked for between their ends.
+class LongSteps {
+ public:
+  LongSteps(const Equations& equations, const InteractionOptions& options)
+      : rates_{&equations},
+        stepper_(options.tolerance * equations.milli(), options.tolerance, 1.0, 0.0, kLongest,
+                 true) {}
+
+  /// An interval, from now on.
+  void begin(const VectorXd& y) { stepper_.initialize(stateOf(y), 0.0, kFirst); }
+
+  /// `later` [s] in it, no earlier than what was asked last.
+  void advance(double later, VectorXd& y) {
+    while (stepper_.current_time() < later) step();
+    State state(static_cast<std::size_t>(y.size()));
+    stepper_.calc_state(later, state);
+    y = vectorOf(state);
+  }
+
+ private:
+  // Where all stands, a step looks at too little to see what begins later.
+  static constexpr double kFirst = 1e-3, kLongest = 0.25;  // [s]
+
+  void step() {
+    try {
+      stepper_.do_step(rates_);
+    } catch (const odeint::no_progress_error&) {
+      throw Diverges();
+    }
+  }
+
+  Rates rates_;
+  odeint::bulirsch_stoer_dense_out<State> stepper_;
 };
 
 /// The interval of `over` [s], step by step: every one is seen, and ends where the tool begins or
@@ -280,6 +324,10 @@ void passContacts(Solver& solver, Equations& equations, double over, VectorXd& y
   }
 }
 
+std::int64_t nextStep(std::int64_t now, const InteractionOptions& options) {
+  return (now / options.step + 1) * options.step;
+}
+
 }  // namespace
 
 MatrixXd augmentedModalMass(const ModalModel& base, const RigidBody& robot_P) {
@@ -297,32 +345,46 @@ std::vector<InteractionPoint> simulate(const Interaction& interaction,
   VectorXd y = equations.start();
 
   Solver solver(equations, options);
-  std::vector<InteractionPoint> out;
-  auto next = interaction.actions.begin();
-  std::int64_t now = 0;
-  for (std::int64_t step = 0; now <= options.duration; ++step) {
-    out.push_back(equations.point(now, y));
-    const std::int64_t end = (step + 1) * options.step;
-    while (now < end) {
-      equations.begin(now, step, y);
-      for (; next != interaction.actions.end() && next->start <= now; ++next)
-        equations.begin(next->action, y);
-      std::int64_t until = end;
-      if (next != interaction.actions.end()) until = std::min(until, next->start);
-      until = equations.pushEnds(until);
-      const double over = static_cast<double>(until - now) * kSecondPerNanosecond;
-      try {
-        if (equations.hasWorld())
-          passContacts(solver, equations, over, y);
-        else
-          for (double later = 0.0; later < over;) later = solver.step(later, over, y);
-      } catch (const Solver::Diverges&) {
-        throw std::domain_error(
-            "the tolerance cannot be kept: the motion grows without bound, or "
-            "too small a tolerance is asked");
+  LongSteps long_steps(equations, options);
+  std::vector<InteractionPoint> out{equations.point(0, y)};
+  const auto keep = [&](std::int64_t time) {
+    if (time % options.step == 0) out.push_back(equations.point(time, y));
+  };
+  const auto pass = [&](std::int64_t now, std::int64_t until) {
+    const auto since = [&](std::int64_t time) {
+      return static_cast<double>(time - now) * kSecondPerNanosecond;
+    };
+    if (equations.hasWorld()) {
+      passContacts(solver, equations, since(until), y);
+    } else if (equations.holdsAStep()) {
+      for (double later = 0.0; later < since(until);) later = solver.step(later, since(until), y);
+    } else {
+      long_steps.begin(y);
+      for (std::int64_t at = nextStep(now, options); at < until; at += options.step) {
+        long_steps.advance(since(at), y);
+        keep(at);
       }
-      now = until;
+      long_steps.advance(since(until), y);
     }
+    keep(until);
+  };
+  const std::int64_t end = options.duration - options.duration % options.step;
+  auto next = interaction.actions.begin();
+  for (std::int64_t now = 0; now < end;) {
+    equations.begin(now, now / options.step, y);
+    for (; next != interaction.actions.end() && next->start <= now; ++next)
+      equations.begin(next->action, y);
+    std::int64_t until = equations.pushEnds(end);
+    if (equations.holdsAStep()) until = std::min(until, nextStep(now, options));
+    if (next != interaction.actions.end()) until = std::min(until, next->start);
+    try {
+      pass(now, until);
+    } catch (const Diverges&) {
+      throw std::domain_error(
+          "the tolerance cannot be kept: the motion grows without bound, or "
+          "too small a tolerance is asked");
+    }
+    now = until;
   }
   return out;
 }

@@ -59,11 +59,14 @@ void ModalEquations::begin(const RidingRobot& robot, std::int64_t step, const Ve
   held_ = robot.composite_L0;
 }
 
-/// Its accelerations but for those of the modes.
-BodyMotion ModalEquations::platform(const RidingRobot& robot, const VectorXd& y) const {
+ModalEquations::Place ModalEquations::placeOf(const RidingRobot& robot, const VectorXd& y) const {
   const PathPoint<6> ground = ground_.at(robot.t);
-  const Vec6 x_dot = base_.Phi * y.segment(modes(), modes()) + ground.x_dot;
-  return bodyMotion(p_IH_, Pose::from(coordinates(y, ground)), x_dot, ground.x_ddot);
+  return {ground, rest_ + base_.Phi * y.head(modes()) + ground.x,
+          base_.Phi * y.segment(modes(), modes()) + ground.x_dot};
+}
+
+BodyMotion ModalEquations::platform(const RidingRobot& robot, const VectorXd& y) const {
+  return motionOf(placeOf(robot, y));
 }
 
 void ModalEquations::derivative(const RidingRobot& robot, const VectorXd& y, const Wrench& F_Po_I,
@@ -77,24 +80,24 @@ void ModalEquations::derivative(const RidingRobot& robot, const VectorXd& y, con
   dy.head(k) = eta_dot;
   VectorXd right = -base_.stiffness.cwiseProduct(eta) - base_.damping * eta_dot;
   MatrixXd A;
+  const Place place = placeOf(robot, y);
+  const Shapes J = jacobian(place);
   if (options_.model == InteractionModel::kSplit)
-    split(robot, y, A, right);
+    split(robot, place, A, right);
   else
-    whole(robot, y, A, right);
-  const PathPoint<6> ground = ground_.at(robot.t);
-  if (const Vec6 F = F_Po_I.stacked(); !F.isZero(0.0)) right += jacobian(y, ground).transpose() * F;
-  if (ground_.moves()) right -= leastSquares(base_.Phi, ground.x_ddot);
-  if (!gravity_.isZero(0.0)) weight(robot, y, right);
+    whole(robot, place, J, A, right);
+  if (const Vec6 F = F_Po_I.stacked(); !F.isZero(0.0)) right += J.transpose() * F;
+  if (ground_.moves()) right -= leastSquares(base_.Phi, place.ground.x_ddot);
+  if (!gravity_.isZero(0.0)) weight(robot, place, right);
   dy.segment(k, k) = solvePositive(A, right);
 }
 
 /// Of the robot, beyond what it is in balance with, and by the ground's tilt of the vehicle itself.
-void ModalEquations::weight(const RidingRobot& robot, const VectorXd& y, VectorXd& right) const {
-  const PathPoint<6> ground = ground_.at(robot.t);
+void ModalEquations::weight(const RidingRobot& robot, const Place& place, VectorXd& right) const {
   const RigidBody all = ves::lockedInP(robot);
   Vec6 own = Vec6::Zero();
-  own.head<3>() = rotation(Vec3(ground.x.tail<3>())).transpose() * gravity_ - gravity_;
-  const Vec3 rpy = (coordinates(y, ground) - ground.x).tail<3>();
+  own.head<3>() = rotation(Vec3(place.ground.x.tail<3>())).transpose() * gravity_ - gravity_;
+  const Vec3 rpy = (place.x - place.ground.x).tail<3>();
   right +=
       base_.Phi.transpose() *
       (workOfWeight(gravity_ + own.head<3>(), all.mass, all.mass * all.p_BoBcm_B, rpy) - at_home_);
@@ -102,17 +105,18 @@ void ModalEquations::weight(const RidingRobot& robot, const VectorXd& y, VectorX
 }
 
 void ModalEquations::tell(const RidingRobot& robot, const VectorXd& y, InteractionPoint& p) const {
-  const PathPoint<6> ground = ground_.at(robot.t);
+  const Place place = placeOf(robot, y);
   p.eta = y.head(modes());
   p.eta_dot = y.segment(modes(), modes());
-  p.x = coordinates(y, ground);
-  p.x_dot = base_.Phi * p.eta_dot + ground.x_dot;
+  p.x = place.x;
+  p.x_dot = place.x_dot;
 }
 
 /// {v, w} of P per eta'.
-MatrixXd ModalEquations::jacobian(const VectorXd& y, const PathPoint<6>& ground) const {
-  MatrixXd J = base_.Phi;
-  J.bottomRows<3>() = angleRateMap(coordinates(y, ground).tail<3>()) * base_.Phi.bottomRows<3>();
+ModalEquations::Shapes ModalEquations::jacobian(const Place& place) const {
+  const Mat3 E = angleRateMap(place.x.tail<3>());
+  Shapes J = base_.Phi;
+  for (Eigen::Index i = 0; i < J.cols(); ++i) J.col(i).tail<3>() = E * J.col(i).tail<3>().eval();
   return J;
 }
 
@@ -121,29 +125,31 @@ RigidBody ModalEquations::lockedInP(const RidingRobot& robot) const {
 }
 
 /// (3.11): A, and what stands beside stiffness and damping on its right.
-void ModalEquations::split(const RidingRobot& robot, const VectorXd& y, MatrixXd& A,
+void ModalEquations::split(const RidingRobot& robot, const Place& place, MatrixXd& A,
                            VectorXd& right) const {
   const RigidBody locked = lockedInP(robot);
   A = augmentedModalMass(base_, locked);
   const auto Phi_u = base_.Phi.topRows<3>(), Phi_l = base_.Phi.bottomRows<3>();
   const Mat3 Rx = skew(locked.p_BoBcm_B);
-  const PathPoint<6> ground = ground_.at(robot.t);
-  const Vec3 w = Phi_l * y.segment(modes(), modes()) + ground.x_dot.tail<3>();
+  const Vec3 w = place.x_dot.tail<3>();
   const Vec3 centripetal = locked.mass * w.cross(Rx * w);
   right += (Phi_u.transpose() + Phi_l.transpose() * Rx) * centripetal;
   right += base_.Phi.transpose() * reaction(robot, ProperMotion{}).stacked();
-  if (ground_.moves()) right -= base_.Phi.transpose() * spatialMass(locked) * ground.x_ddot;
+  if (ground_.moves()) right -= base_.Phi.transpose() * spatialMass(locked) * place.ground.x_ddot;
 }
 
-void ModalEquations::whole(const RidingRobot& robot, const VectorXd& y, MatrixXd& A,
-                           VectorXd& right) const {
-  const BodyMotion P = platform(robot, y);
+void ModalEquations::whole(const RidingRobot& robot, const Place& place, const Shapes& J,
+                           MatrixXd& A, VectorXd& right) const {
+  const BodyMotion P = motionOf(place);
   // The wrench is affine in the base's acceleration: this much without, the locked mass with it.
   const Wrench F_Po_P = reaction(robot, properMotion(P, robot.X_PL0, Vec3::Zero()));
-  const MatrixXd J = jacobian(y, ground_.at(robot.t));
   right += J.transpose() * rotate(P.X.R, F_Po_P).stacked();
   const Mat6 M_1 = spatialMass(rotated(P.X.R, ves::lockedInP(robot)));
-  A = MatrixXd::Identity(modes(), modes()) + J.transpose() * M_1 * J;
+  Shapes M_1_J(6, modes());
+  for (Eigen::Index i = 0; i < modes(); ++i) M_1_J.col(i).noalias() = M_1 * J.col(i);
+  A.resize(modes(), modes());
+  A.noalias() = J.transpose().lazyProduct(M_1_J);
+  A.diagonal().array() += 1.0;
 }
 
 FreeBodyEquations::FreeBodyEquations(const FreeBodyModel& model, const Interaction& interaction,

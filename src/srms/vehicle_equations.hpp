@@ -33,6 +33,8 @@ class ModalEquations {
   double milli() const { return modes() > 0 ? 1e-3 / base_.Phi.cwiseAbs().maxCoeff() : 1e-3; }
   /// The interval that begins now, `step` steps after the start.
   void begin(const RidingRobot& robot, std::int64_t step, const Eigen::VectorXd& y);
+  /// Whether something is held from step to step.
+  bool holdsAStep() const { return options_.hold_mass > 0; }
   /// Where P is, and how it moves.
   BodyMotion platform(const RidingRobot& robot, const Eigen::VectorXd& y) const;
   /// The robot has another load, while P moves as before.
@@ -44,17 +46,24 @@ class ModalEquations {
 
  private:
   Eigen::Index modes() const { return base_.stiffness.size(); }
-  Vec6 coordinates(const Eigen::VectorXd& y, const PathPoint<6>& ground) const {
-    return rest_ + base_.Phi * y.head(modes()) + ground.x;
+  using Shapes = Eigen::Matrix<double, 6, Eigen::Dynamic>;
+  /// How the platform moves, but for the accelerations of the modes.
+  struct Place {
+    PathPoint<6> ground;
+    Vec6 x, x_dot;  // [m, rad], [m/s, rad/s]
+  };
+  Place placeOf(const RidingRobot& robot, const Eigen::VectorXd& y) const;
+  BodyMotion motionOf(const Place& place) const {
+    return bodyMotion(p_IH_, Pose::from(place.x), place.x_dot, place.ground.x_ddot);
   }
-  Eigen::MatrixXd jacobian(const Eigen::VectorXd& y, const PathPoint<6>& ground) const;
+  Shapes jacobian(const Place& place) const;
   RigidBody lockedInP(const RidingRobot& robot) const;
-  void split(const RidingRobot& robot, const Eigen::VectorXd& y, Eigen::MatrixXd& A,
+  void split(const RidingRobot& robot, const Place& place, Eigen::MatrixXd& A,
              Eigen::VectorXd& right) const;
-  void whole(const RidingRobot& robot, const Eigen::VectorXd& y, Eigen::MatrixXd& A,
+  void whole(const RidingRobot& robot, const Place& place, const Shapes& J, Eigen::MatrixXd& A,
              Eigen::VectorXd& right) const;
 
-  void weight(const RidingRobot& robot, const Eigen::VectorXd& y, Eigen::VectorXd& right) const;
+  void weight(const RidingRobot& robot, const Place& place, Eigen::VectorXd& right) const;
 
   const ModalModel& base_;
   const GroundMotion& ground_;
@@ -80,6 +89,7 @@ class FreeBodyEquations {
   double milli() const { return 1e-3; }
   /// Thrusters are held from step to step, as a controller holds them.
   void begin(const RidingRobot& robot, std::int64_t step, const Eigen::VectorXd& y);
+  bool holdsAStep() const { return model_.propulsion.any(); }
   BodyMotion platform(const RidingRobot& robot, const Eigen::VectorXd& y) const;
   void load(const RidingRobot& robot, const BodyMotion& P, Eigen::VectorXd& y) const {
     y.head(size()) = stateOf(robot, P);

@@ -71,8 +71,9 @@ struct InteractionPoint {
   ContactWatch contacts;  // up to now
 };
 
-/// Cash and Karp's Runge-Kutta 5(4), by Boost, with adaptive steps; where the tool begins or ceases
-/// to touch something, a step ends to 1e-12 s. Throws std::domain_error when the tolerance cannot
+/// Bulirsch and Stoer's steps, by Boost, interpolated at the points; where something is held from
+/// step to step, or may touch, Cash and Karp's Runge-Kutta 5(4) in its place, and where the tool
+/// begins or ceases to touch, a step ends to 1e-12 s. Throws std::domain_error when the tolerance cannot
 /// be kept.
 std::vector<InteractionPoint> simulate(const Interaction& interaction,
                                        const InteractionOptions& options);
