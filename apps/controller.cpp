@@ -48,7 +48,7 @@ std::filesystem::path findCalibration(ControllerOptions& options) {
     return kept;
   const Value document = loadDocument(kept);
   const CalibrationRecord record = readCalibration(Section(document, ""));
-  if (record.setup == options.load().source.calibrated)
+  if (record.setup == options.load().source.calibrated())
     options.belief.calibration = kept;
   else
     fmt::print(stderr, "warning: {} is of another sensor, robot, masses or gravity: not used\n",

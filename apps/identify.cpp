@@ -62,7 +62,7 @@ int plan(const std::string& scenario, const std::vector<std::string>& overrides,
   std::filesystem::path from = std::filesystem::proximate(std::filesystem::absolute(base), folder);
   if (!overrides.empty()) {  // what it builds on is no file yet
     from = std::filesystem::path(file).stem().string() + "_base.yaml";
-    writeGiven("--out", (folder / from).string(), e.source.resolved);
+    writeGiven("--out", (folder / from).string(), e.source.resolved());
   }
   writeGiven("--out", file, scenarioOf(plan, e, name, from.string()));
   loadExperiment(file);  // what is refused is refused now

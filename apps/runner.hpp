@@ -71,7 +71,7 @@ inline LaunchOptions prepareFolder(RunnerOptions& options, const Experiment& exp
   LaunchOptions launch;
   launch.program = ownProgram();
   launch.scenario = folder / "experiment.yaml";
-  writeFile(launch.scenario, experiment.source.resolved);
+  writeFile(launch.scenario, experiment.source.resolved());
   options.process.log = (folder / "run.lcmlog").string();
   launch.process = options.process;
   return launch;

@@ -101,9 +101,9 @@ TEST(Config, AScenarioHasNoOtherOnesTitle) {
 TEST(Config, ResolvedTextReadsBackToTheSameExperiment) {
   for (const auto& entry : fs::directory_iterator(scenarios())) {
     const Experiment e = loadExperiment(entry.path());
-    const Experiment back = parseExperiment(e.source.resolved, "resolved");
-    EXPECT_EQ(back.source.resolved, e.source.resolved);
-    EXPECT_EQ(back.source.hash, e.source.hash);
+    const Experiment back = parseExperiment(e.source.resolved(), "resolved");
+    EXPECT_EQ(back.source.resolved(), e.source.resolved());
+    EXPECT_EQ(back.source.hash(), e.source.hash());
     EXPECT_EQ(back.controller.sensor.C_proc, e.controller.sensor.C_proc);
     EXPECT_EQ(back.controller.program.size, e.controller.program.size);
     EXPECT_EQ(back.robot.joint_names, e.robot.joint_names);

@@ -109,7 +109,7 @@ TEST(Summary, HasEachNumberOfARunUnderItsOwnName) {
   EXPECT_EQ(out.at("log_trouble"), "no room");
   EXPECT_EQ(out.at("messages_malformed"), 16);
   EXPECT_EQ(out.at("seed"), series.experiment.plant.seed);
-  EXPECT_EQ(out.at("configuration_hash"), series.experiment.source.hash);
+  EXPECT_EQ(out.at("configuration_hash"), series.experiment.source.hash());
   result.wall = 0.0;
   EXPECT_EQ(summarise(series, result).at("real_time_factor"), 0.0);
 }

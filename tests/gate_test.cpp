@@ -604,7 +604,7 @@ TEST(Gate, HoldsSlowGrowthAgainstTheLengthOfTheRun) {
          "controller.compensation.inertia=true",
          fmt::format("program=[{{move: {{}}}}, {{admittance: {{duration_s: {}}}}}]", seconds)});
     applyStabilityCheck(e);
-    EXPECT_EQ(parseExperiment(e.source.resolved, "resolved").controller.stable_for,
+    EXPECT_EQ(parseExperiment(e.source.resolved(), "resolved").controller.stable_for,
               e.controller.stable_for);
     return e.controller;
   };
@@ -613,7 +613,7 @@ TEST(Gate, HoldsSlowGrowthAgainstTheLengthOfTheRun) {
   EXPECT_EQ(again.controller.stable_for, 5.0);
   applyStabilityCheck(again);
   EXPECT_EQ(again.controller.stable_for, HUGE_VAL);
-  EXPECT_EQ(parseExperiment(again.source.resolved, "again").controller.stable_for, HUGE_VAL);
+  EXPECT_EQ(parseExperiment(again.source.resolved(), "again").controller.stable_for, HUGE_VAL);
   const ControllerConfig minute = assessed(60.0, 1.1), week = assessed(6e5, 1.1);
   EXPECT_EQ(minute.stability, Stability::kStable);
   EXPECT_EQ(minute.stable_for, 60.0);

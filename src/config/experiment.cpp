@@ -261,15 +261,14 @@ Experiment build(const Value& document, AskedKey* asked = nullptr) {
 
   if (root.has("environment")) p.task.world = readEnvironment(root.section("environment"), out);
 
-  out.source.calibrated = setupOf(document);
   if (root.has("calibration")) {
     Section section = root.section("calibration");
     out.source.calibration = readCalibration(section);
-    if (out.source.calibration->setup != out.source.calibrated)
+    if (const std::string setup = setupOf(document); out.source.calibration->setup != setup)
       section.fail("setup",
                    fmt::format("{} is of another sensor, robot, masses or gravity, want {}; "
                                "calibrate again",
-                               out.source.calibration->setup, out.source.calibrated));
+                               out.source.calibration->setup, setup));
     c.bias = out.source.calibration->bias;
   }
 
@@ -313,12 +312,16 @@ Experiment build(const Value& document, AskedKey* asked = nullptr) {
   if (const Value* said = document.find("legs"); said && !p.hydraulic)
     if (const Value* unused = said->find("hydraulic"))
       out.source.substitutes -= countSubstitutes(*unused, false);
-  out.source.resolved = emit(document);
-  out.source.hash = fingerprint(out.source.resolved);
   return out;
 }
 
 }  // namespace
+
+std::string Provenance::resolved() const { return emit(document); }
+
+std::string Provenance::hash() const { return fingerprint(resolved()); }
+
+std::string Provenance::calibrated() const { return setupOf(document); }
 
 Experiment loadExperiment(const std::filesystem::path& file,
                           const std::vector<std::string>& overrides, const BeliefFiles& files) {
@@ -382,8 +385,6 @@ std::string applyStabilityCheck(Experiment& e) {
   };
   putSeconds("stable_for_s", c.stable_for);
   putSeconds("stable_for_uncompensated_s", c.stable_for_uncompensated);
-  e.source.resolved = emit(e.source.document);
-  e.source.hash = fingerprint(e.source.resolved);
   return why;
 }
 

@@ -171,7 +171,7 @@ class Console {
   }
 
   void keepCalibration(const state_t& s) {
-    const CalibrationRecord record = calibrationOf(s, experiment_.source.calibrated, temperature_);
+    const CalibrationRecord record = calibrationOf(s, experiment_.source.calibrated(), temperature_);
     calibration_ = record;
     std::string table = "calibrated  bias          of a sample  standard error [count]\n";
     for (int i = 0; i < 6; ++i)

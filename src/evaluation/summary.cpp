@@ -313,7 +313,7 @@ nlohmann::ordered_json summarise(const Series& series, const RunResult& result,
   nlohmann::ordered_json out;
   out["scenario"] = series.experiment.name;
   out["description"] = series.experiment.description;
-  out["configuration_hash"] = series.experiment.source.hash;
+  out["configuration_hash"] = series.experiment.source.hash();
   out["seed"] = series.experiment.plant.seed;
   out["version"] = series.version;
   out["substitute_values"] = series.experiment.source.substitutes;

@@ -17,15 +17,16 @@ std::optional<ToolMotion> toolMotion(const Series& series, const std::optional<E
   if (!e || !experiment.robot.tool()) return {};
   ToolMotion out;
   const BasePoses base = basePoses(series, e->base);
-  const Vec6& start = e->base.x.front();
+  const Geometry& geometry = experiment.plant.geometry;
+  const Transform start = geometry.fromHome(Pose::from(e->base.x.front()));
   eachTick(series, [&](const Row& row, double) {
     const auto x = at(base, row.state);
     if (!row.hasTruePose() || !x) return;
-    const JointVector q = JointVector::Map(row.truth.q);
+    const Transform X_PT = toolInP(experiment, JointVector::Map(row.truth.q));
     out.tick.push_back(row.state.header.sequence);
-    out.actual.push_back(toolPose(experiment, Vec6::Map(row.truth.x), q));
-    out.on_base.push_back(toolPose(experiment, *x, q));
-    out.at_rest.push_back(toolPose(experiment, start, q));
+    out.actual.push_back(geometry.fromHome(Pose::from(Vec6::Map(row.truth.x))) * X_PT);
+    out.on_base.push_back(geometry.fromHome(Pose::from(*x)) * X_PT);
+    out.at_rest.push_back(start * X_PT);
   });
   return out;
 }

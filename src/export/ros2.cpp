@@ -97,8 +97,8 @@ class McapExport::Impl {
   }
 
   void finish() {
-    out_.attach(experiment_.name + ".yaml", "application/yaml", experiment_.source.resolved);
-    out_.describe("ves", {{"configuration_hash", experiment_.source.hash},
+    out_.attach(experiment_.name + ".yaml", "application/yaml", experiment_.source.resolved());
+    out_.describe("ves", {{"configuration_hash", experiment_.source.hash()},
                           {"version", version_},
                           {"scenario", experiment_.name}});
     out_.finish();

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "ves/bus/channels.hpp"
+#include "ves/config/document.hpp"
 #include "ves/core/build.hpp"
 #include "ves/realtime/realtime.hpp"
 #include "ves/run/run.hpp"
@@ -18,9 +19,9 @@ experiment_t describe(const Experiment& experiment, const Identity& from, std::i
   m.header = header(from, 0, time);
   m.schema = kSchema;
   m.name = experiment.name;
-  m.hash = experiment.source.hash;
   m.version = describeBuild();
-  m.resolved = experiment.source.resolved;
+  m.resolved = experiment.source.resolved();
+  m.hash = fingerprint(m.resolved);
   return m;
 }
 
@@ -39,7 +40,7 @@ RunResult runRecorded(const Experiment& experiment, RunRecorder* recorder, const
   Lockstep& loop = *whole;  // large for a stack
   RunMonitor monitor(experiment.controller);
   const auto time = [&] { return loop.plant().time(); };
-  if (recorder) recorder->begin(describe(experiment, controller, 0));
+  if (recorder) recorder->begin(experiment, controller);
 
   const std::int64_t start = monotonicNow();
   std::int64_t orders = 0;
@@ -72,8 +73,8 @@ namespace {
 class LogRecorder : public RunRecorder {
  public:
   explicit LogRecorder(LogWriter& log) : log_(log) {}
-  void begin(const experiment_t& experiment) override {
-    log_.write(channel::kExperiment, experiment, 0);
+  void begin(const Experiment& experiment, const Identity& controller) override {
+    log_.write(channel::kExperiment, describe(experiment, controller, 0), 0);
   }
   void tick(const TickMessages& m, std::int64_t time) override {
     log_.write(channel::kTruth, m.truth, time);

@@ -15,6 +15,7 @@
 #include "ves/bus/fields.hpp"
 #include "ves/bus/ordered_log.hpp"
 #include "ves/contract/schema.hpp"
+#include "ves/core/build.hpp"
 #include "ves/core/coordinates.hpp"
 
 namespace ves {
@@ -118,7 +119,7 @@ namespace {
 class SeriesRecorder : public RunRecorder {
  public:
   explicit SeriesRecorder(Series& series) : series_(series) {}
-  void begin(const experiment_t& experiment) override { series_.version = experiment.version; }
+  void begin(const Experiment&, const Identity&) override { series_.version = describeBuild(); }
   void tick(const TickMessages& m, std::int64_t) override {
     rows_.add(m.truth);
     rows_.add(m.sample);
@@ -277,10 +278,13 @@ Transform emulatedPose(const state_t& state) noexcept {
   return laboratoryOf(state).E_H.X * Transform{rotation(x.rpy), x.p};
 }
 
+Transform toolInP(const Experiment& experiment, const JointVector& q) {
+  const Payload& payload = experiment.plant.payload;
+  return payload.X_PL0() * experiment.robot.tool()->pose(linkPoses(payload.robot, q));
+}
+
 Transform toolPose(const Experiment& experiment, const Vec6& x, const JointVector& q) {
-  const plant::PlantConfig& plant = experiment.plant;
-  return plant.geometry.fromHome(Pose::from(x)) * plant.payload.X_PL0() *
-         experiment.robot.tool()->pose(linkPoses(plant.payload.robot, q));
+  return experiment.plant.geometry.fromHome(Pose::from(x)) * toolInP(experiment, q);
 }
 
 double coordinateOf(const Transform& X_IT, int i) {

@@ -177,7 +177,7 @@ Commissioned commissioned(const Series& series, const Commissioning& commissioni
     for (int i = 0; i < kWrenchChannels; ++i)
       most(i) = std::max(most(i), std::abs(static_cast<double>(row.sample.adc[i])));
     if (row.state.calibration == static_cast<int>(CalibrationStatus::kDone) && !out.calibration)
-      out.calibration = calibrationOf(row.state, commissioning.experiment.source.calibrated,
+      out.calibration = calibrationOf(row.state, commissioning.experiment.source.calibrated(),
                                       row.sample.temperature);
   }
   for (int i = 0; i < 6; ++i)
@@ -233,7 +233,7 @@ std::string beliefOf(const Commissioned& found, const Experiment& scenario,
   if (!found.calibration) return text;
   if (found.masses) document.put("masses", *parseDocument(text, "belief").find("masses"));
   CalibrationRecord calibration = *found.calibration;
-  calibration.setup = buildExperiment(std::move(document)).source.calibrated;
+  calibration.setup = buildExperiment(std::move(document)).source.calibrated();
   section("calibration", write(calibration));
   return text;
 }

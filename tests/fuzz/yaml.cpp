@@ -13,8 +13,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const std::string emitted = ves::emit(document);
     ves::fuzz::require(ves::emit(ves::parseDocument(emitted, "again.yaml")) == emitted);
     const ves::Experiment e = ves::parseExperiment(text, "fuzz.yaml");
-    ves::fuzz::require(ves::parseExperiment(e.source.resolved, "again").source.hash ==
-                       e.source.hash);
+    ves::fuzz::require(ves::parseExperiment(e.source.resolved(), "again").source.hash() ==
+                       e.source.hash());
   } catch (const ves::InputError&) {
   }
   return 0;

@@ -78,14 +78,18 @@ struct MachinePieces {
 
 /// Where the numbers of an experiment came from.
 struct Provenance {
-  Value document;        // what it was built from, URDF inside
-  std::string resolved;  // the same as YAML; parseExperiment() reads it back
-  std::string hash;      // of `resolved`
-  int substitutes = 0;   // [-] numbers that stand in for unknown ones
+  Value document;       // what it was built from, URDF inside
+  int substitutes = 0;  // [-] numbers that stand in for unknown ones
   std::optional<CalibrationRecord> calibration;  // that the bias comes from
-  std::string calibrated;  // hash of what a calibration depends on: sensor, robot, gravity
   std::vector<std::string> warnings;
   std::vector<std::string> notes;  // known oddities of a robot's file
+
+  /// The document as YAML; parseExperiment() reads it back.
+  std::string resolved() const;
+  /// Of resolved().
+  std::string hash() const;
+  /// Of what a calibration depends on: sensor, robot, gravity, masses.
+  std::string calibrated() const;
 };
 
 /// One experiment, complete. What judges or decides for the controller takes the controller's part
@@ -122,11 +126,11 @@ Experiment buildExperiment(Value document, const std::vector<std::string>& overr
 /// Builds it for what its readers ask on the way.
 void askKeys(const Value& document, AskedKey& asked);
 
-/// Reads back what Experiment::resolved holds; `name` stands for a file name in messages.
+/// Reads back what Provenance::resolved() wrote; `name` stands for a file name in messages.
 Experiment parseExperiment(const std::string& resolved, const std::string& name);
 
 /// Looks whether the experiment's admittance control decays, and writes the verdict into its
-/// controller and its resolved text. Without it admittance control is refused. Returns the
+/// controller and its document. Without it admittance control is refused. Returns the
 /// explanation where the loop would diverge; empty when all is well.
 std::string applyStabilityCheck(Experiment& experiment);
 

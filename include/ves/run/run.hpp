@@ -51,7 +51,7 @@ struct TickMessages {
 class RunRecorder {
  public:
   virtual ~RunRecorder() = default;
-  virtual void begin(const experiment_t& experiment) = 0;
+  virtual void begin(const Experiment& experiment, const Identity& controller) = 0;
   virtual void tick(const TickMessages& messages, std::int64_t time) = 0;  // [ns]
   virtual void order(const operator_t& order, std::int64_t time) = 0;
 };

@@ -71,6 +71,8 @@ Laboratory laboratoryOf(const state_t& state) noexcept;
 /// X_EP about home as commanded; without a laboratory that flies x itself.
 Transform emulatedPose(const state_t& state) noexcept;
 
+/// X_PT, the joints at q. The robot has a tool.
+Transform toolInP(const Experiment& experiment, const JointVector& q);
 /// X_IT, the platform at x [m, rad] from home, the joints at q. The robot has a tool.
 Transform toolPose(const Experiment& experiment, const Vec6& x, const JointVector& q);
 
