@@ -824,16 +824,66 @@ TEST(ServoObserver, ACommandCountsFromWhenTheMachineSaysItCame) {
   const SideBySide told(servo, 4'000'000);
   EXPECT_LT(told.off(told.modelled, kTick), 0.02);
   // Of another tick, or from elsewhere, it is not about these.
-  ServoObserver observer(servo, 0.01), plain(servo, 0.01);
-  for (ServoObserver* one : {&observer, &plain}) {
-    one->reset(Vec6::Constant(1.5), 0);
-    one->send(Vec6::Constant(1.51), 7, 0);
+  using Arrival = std::pair<std::int64_t, std::int64_t>;
+  const auto lengthAfter = [&](const std::vector<Arrival>& arrivals) {
+    ServoObserver observer(servo, 0.01);
+    observer.reset(Vec6::Constant(1.5), 0);
+    observer.send(Vec6::Constant(1.51), 7, 0);
+    for (const auto& [tick, time] : arrivals) observer.arrived(tick, time);
+    observer.advance(2 * kTick);
+    return observer.length();
+  };
+  const Vec6 plain = lengthAfter({});
+  for (const Arrival& other : {Arrival(6, 5'000'000), Arrival(8, 5'000'000), Arrival(7, 50'000'000),
+                               Arrival(7, -50'000'000), Arrival(-1, 0)})
+    EXPECT_EQ(lengthAfter({other}), plain) << other.first << " " << other.second;
+  EXPECT_LT(lengthAfter({{7, 5'000'000}})(0), plain(0) - 1e-5);
+}
+
+// What is learnt of a servo takes the place of what was believed, in every number.
+TEST(ModelledServos, TakeGainsAsIfTheyHadAlwaysHadThem) {
+  ServoModel before = experiment("z_sine", kCompensated).controller.servo, after = before;
+  for (int i = 0; i < kLegs; ++i) {
+    after.extend(i) *= 1.1 + 0.01 * i;
+    after.retract(i) *= 0.9 - 0.01 * i;
+    after.delay(i) += 0.004 + 0.001 * i;
   }
-  observer.arrived(6, 5'000'000);
-  observer.arrived(7, 500'000'000);
-  observer.arrived(-1, 0);
-  for (ServoObserver* one : {&observer, &plain}) one->advance(kTick);
-  EXPECT_EQ(observer.length(), plain.length());
+  const auto lengthOf = [](ModelledServos servos) {
+    servos.reset(Vec6::Constant(1.5), 0);
+    for (int k = 0; k < 20; ++k) {
+      servos.send(Vec6::Constant(1.5 + 0.01 * std::sin(0.8 * k)), k, k * kTick);
+      servos.advance((k + 1) * kTick);
+    }
+    return servos.length();
+  };
+  ModelledServos changed(before, 0.01, 0.5);
+  EXPECT_GT((lengthOf(changed) - lengthOf(ModelledServos(after, 0.01, 0.5))).norm(), 1e-4);
+  changed.use({after.extend, after.retract, after.delay});
+  EXPECT_EQ(lengthOf(changed), lengthOf(ModelledServos(after, 0.01, 0.5)));
+}
+
+// Feed-forward is exact for what it knows: a steady acceleration, of a leg that answers late.
+TEST(FeedForward, ALegThatAnswersLateFollowsAParabola) {
+  ServoModel servo = experiment("z_sine", kCompensated).controller.servo;
+  servo.readings.scale.setConstant(1e-9);
+  servo.derivative = servo.reading_age = 0.0;
+  servo.update = 1e-5;
+  servo.friction.setZero();
+  servo.friction_way = 1e-3;
+  servo.delay.setConstant(0.03);  // three ticks
+  const double T = 0.01, a = 0.05;
+  RubbingLeg leg{servo};
+  std::vector<double> references;
+  double off = 0.0;
+  for (int k = 0; k < 200; ++k) {
+    const double t = k * T;
+    const LegMotion at{Vec6::Constant(1.5 + 0.5 * a * t * t), Vec6::Constant(a * t),
+                       Vec6::Constant(a)};
+    references.push_back(feedForward(servo, at, 0.0, T, 1.0, Vec6::Zero())(0));
+    if (k > 100) off += (leg.L - at.L(0)) / 99.0;
+    leg.run(references[static_cast<std::size_t>(std::max(0, k - 3))], T);
+  }
+  EXPECT_LT(std::abs(off), 2e-6);  // half of what acceleration asks for is 2e-5 m
 }
 
 TEST(ServoObserver, AReadingIsComparedWithTheModelAtItsOwnTime) {

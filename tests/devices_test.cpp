@@ -608,9 +608,11 @@ TEST(NetFt, ReadsRecordsWithTheirTimeAsksAgainAndNeverTakesABias) {
     EXPECT_GE(w.time, before - 1'000'000);
     EXPECT_LE(w.time, monotonicNow());
     // Switched off and on again: it counts from one, and knows of no client.
+    const sockaddr_in asked = *sensor.client();
     sensor.forgetClient();
     const std::int64_t stamp = w.time;
     while (!sensor.streaming()) {
+      sensor.sendBytesTo(asked, {1, 2, 3});  // no record, and no sign of life
       driver.read(w);
       EXPECT_EQ(w.time, stamp);  // what is old says so
       usleep(500);

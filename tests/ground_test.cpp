@@ -103,6 +103,28 @@ TEST(Ground, FreeSpaceIsTheClosedFormOfAShakenOscillator) {
           << k << " at " << p.t;
 }
 
+// What the wrench was felt at, and what goes on unpushed, is the motion itself without
+// accelerations.
+TEST(Ground, OfItsMotionOnlyAccelerationsAreLeftOut) {
+  VehicleModel vehicle = oscillators(0.05);
+  vehicle.ground = wave(2.0 * M_PI * 0.4, Vec6::Constant(0.02), Vec6::Constant(-0.01));
+  AdmittanceModel model(vehicle, kPeriod);
+  model.reset(Vec6::Zero());
+  double fastest = 0.0;
+  for (int n = 0; n < 100; ++n) {
+    model.step(Wrench{{3.0, 2.0, 1.0}, {0.1, 0.2, 0.3}});
+    const BodyMotion moves = model.bodyMotion();
+    fastest = std::max(fastest, moves.a.norm());
+    for (const BodyMotion& one : {model.atWrench(), model.coasting()}) {
+      EXPECT_LT((one.X.p - moves.X.p).norm() + (one.X.R - moves.X.R).norm(), 1e-15);
+      EXPECT_LT((one.v - moves.v).norm() + (one.w - moves.w).norm(), 1e-15);
+      EXPECT_EQ(one.a, Vec3(Vec3::Zero()));
+      EXPECT_EQ(one.alpha, Vec3(Vec3::Zero()));
+    }
+  }
+  EXPECT_GT(fastest, 0.01);
+}
+
 TEST(Ground, TheModelIsItsClosedFormToTheOrderOfItsStep) {
   const ModalModel modes = oscillators(0.05);
   const double w = 2.0 * M_PI * 0.4;

@@ -49,8 +49,9 @@ TEST(Key, FilesThatAreNoKeyOrForAllToReadAreRefused) {
   EXPECT_NE(refused(KeyFile(std::string(64, 'a'), 0640)).find("mode 0640, want 0600"),
             std::string::npos);
   EXPECT_NE(refused(KeyFile(std::string(64, 'a'), 0604)).find("mode"), std::string::npos);
-  for (const std::string& text : {std::string(), std::string(63, 'a'), std::string(66, 'a'),
-                                  std::string(63, 'a') + "g", std::string(32, '\0')})
+  for (const std::string& text :
+       {std::string(), std::string(62, 'a'), std::string(63, 'a'), std::string(65, 'a'),
+        std::string(66, 'a'), std::string(63, 'a') + "g", std::string(32, '\0')})
     EXPECT_NE(refused(KeyFile(text)).find("64 hexadecimal digits"), std::string::npos) << text;
   EXPECT_NE(test::refusal([] { Key key("/no/such.key"); }).find("No such file"), std::string::npos);
 }

@@ -247,9 +247,16 @@ TEST(Plant, ARobotThatHasMovedAndStandsWeighsWhatItDoesThere) {
   RigidBody load;
   load.mass = 3.0;
   load.p_BoBcm_B = {0.1, 0.0, 0.05};
-  ASSERT_TRUE(plant.moveRobot(Grasp{5, load}));  // no joint moves
-  payload.robot = withLoad(payload.robot, 5, load);
-  EXPECT_LT(weighs(), 1e-9);
+  // Each time as if it were the first: nothing of the load before stays. No joint moves.
+  for (const double more : {0.0, 2.0, -1.5}) {
+    load.mass = 3.0 + more;
+    ASSERT_TRUE(plant.moveRobot(Grasp{5, load}));
+    payload.robot = withLoad(e.plant.payload.robot, 5, load);
+    EXPECT_LT(weighs(), 1e-9) << more;
+    ASSERT_TRUE(plant.moveRobot(Release()));
+    payload.robot = e.plant.payload.robot;
+    EXPECT_LT(weighs(), 1e-9) << more;
+  }
 }
 
 TEST(Plant, JointsFollowAFifthOrderPolynomial) {
@@ -310,6 +317,26 @@ TEST(Plant, ALongLeapIsAsGoodAsManySteps) {  // what is still is passed over; wh
   for (std::size_t i = 0; i < kLegs; ++i) EXPECT_NEAR(many.legs[i], one.legs[i], 1) << i;
   for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(many.adc[i], one.adc[i], 1) << i;
   EXPECT_LT(many.legs[0], many.legs[1] - 4000);
+}
+
+// What stands for the readings from before the start was read in the same hall.
+TEST(Plant, TheFirstReadingsAreAsWarmAsTheNext) {
+  const auto readings = [](const std::string& swing) {
+    Experiment e = experiment("puma_on_table_4_1",
+                              {"sensor.readings_per_tick=5", "sensor.noise=false",
+                               "sensor.temperature.swing_c=" + swing,
+                               "sensor.temperature.rising_h=-6"});  // warmest at the start
+    plant::Plant plant(e.plant);
+    std::vector<Sample> out{plant.sample()};
+    plant.advance(1'000'000'000);
+    out.push_back(plant.sample());
+    return out;
+  };
+  const std::vector<Sample> warm = readings("16"), cold = readings("0");
+  for (std::size_t i = 0; i < kWrenchChannels; ++i) {
+    EXPECT_NEAR(warm[0].adc[i], warm[1].adc[i], 1.5) << i;
+    EXPECT_GT(std::abs(warm[0].adc[i] - cold[0].adc[i]), 10.0) << i;
+  }
 }
 
 TEST(Plant, AveragedReadingsAreThoseOfTheMiddlesOfTheWindowsParts) {

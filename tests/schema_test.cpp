@@ -413,6 +413,44 @@ TEST(Schema, EveryFieldHasItsColumnsWithTheirUnits) {
   EXPECT_EQ(table.at("tripped"), set);
 }
 
+TEST(Schema, WhatIsOffHasNoColumns) {
+  const auto namesWith = [](const std::function<void(Experiment&)>& change) {
+    Experiment e = ninebodied(test::experiment("srms_capture_doss"));
+    Compensation& compensation = e.controller.compensation;
+    compensation.aided = compensation.adaptation = compensation.learns_masses = true;
+    e.controller.moving_frame.enabled = true;
+    FreeBodyModel floats;
+    floats.propulsion.size = 1;
+    e.controller.vehicle = floats;
+    change(e);
+    const std::vector<std::string> names = cells(csvHeader(columns(e)));
+    return std::set<std::string>(names.begin(), names.end());
+  };
+  const std::set<std::string> all = namesWith([](Experiment&) {});
+  struct Off {
+    std::function<void(Experiment&)> change;
+    std::vector<std::string> parts;  // of the names of its columns
+  };
+  const std::vector<Off> offs = {
+      {[](Experiment& e) { e.controller.compensation.aided = false; }, {"_reaction_"}},
+      {[](Experiment& e) { e.controller.compensation.adaptation = false; },
+       {"_gain_extend_", "_gain_retract_", "_servo_delay_"}},
+      {[](Experiment& e) { e.controller.compensation.learns_masses = false; }, {"_learnt_"}},
+      {[](Experiment& e) { e.controller.moving_frame.enabled = false; },
+       {"laboratory", "emulated_"}},
+      {[](Experiment& e) { e.controller.vehicle = FreeBodyModel(); },
+       {"vehicle_time_", "thruster"}}};
+  for (const Off& off : offs) {
+    const std::set<std::string> left = namesWith(off.change);
+    for (const std::string& name : all) {
+      const bool of_it = std::any_of(
+          off.parts.begin(), off.parts.end(),
+          [&](const std::string& part) { return name.find(part) != std::string::npos; });
+      EXPECT_EQ(left.count(name), of_it ? 0u : 1u) << name << " without " << off.parts[0];
+    }
+  }
+}
+
 /// Numbers of a message as ROS 2 has it, read by its definition's text.
 Numbers rosNumbers(const std::string& definition, const std::string& cdr) {
   Numbers out;

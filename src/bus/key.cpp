@@ -42,9 +42,8 @@ Key::Key(const std::string& file) {
   std::string text(std::istreambuf_iterator<char>(in), {});
   while (!text.empty() && (text.back() == '\n' || text.back() == '\r')) text.pop_back();
   std::size_t read = 0;
-  if (text.size() != 2 * key_.size() ||
-      sodium_hex2bin(key_.data(), key_.size(), text.data(), text.size(), nullptr, &read, nullptr) !=
-          0 ||
+  if (sodium_hex2bin(key_.data(), key_.size(), text.data(), text.size(), nullptr, &read,
+                     nullptr) != 0 ||
       read != key_.size())
     fail("want 64 hexadecimal digits, as `openssl rand -hex 32` writes them");
 }

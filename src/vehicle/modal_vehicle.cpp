@@ -445,8 +445,10 @@ BodyMotion ModalVehicle::coasting() const noexcept {
 BodyMotion ModalVehicle::atWrench() const noexcept {
   Vec6 x_dot = dynamics_.Phi() * now_.modes.eta_dot;
   if (ground_.moves()) x_dot += now_.ground.x_dot;
-  return ves::bodyMotion(Vec3::Zero(), Pose::from(coordinates(now_.modes, now_.ground)), x_dot,
-                         Vec6::Zero());
+  BodyMotion out = ves::bodyMotion(Vec3::Zero(), Pose::from(coordinates(now_.modes, now_.ground)),
+                                   x_dot, Vec6::Zero());
+  out.alpha = Vec3::Zero();  // also of the axes that the angles turn about
+  return out;
 }
 
 void ModalVehicle::displace(const Modes& by) noexcept {

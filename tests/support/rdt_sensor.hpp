@@ -101,15 +101,21 @@ class Sensor {
     const std::lock_guard lock(mutex_);
     return pages_;
   }
+  std::optional<sockaddr_in> client() {
+    const std::lock_guard lock(mutex_);
+    return client_;
+  }
+  void sendBytesTo(const sockaddr_in& whom, const std::vector<std::uint8_t>& bytes) {
+    sendto(udp_, bytes.data(), bytes.size(), 0, reinterpret_cast<const sockaddr*>(&whom),
+           sizeof whom);
+  }
   void forgetClient() {
     const std::lock_guard lock(mutex_);
     client_.reset();
   }
   void sendBytes(const std::vector<std::uint8_t>& bytes) {
     const std::lock_guard lock(mutex_);
-    if (client_)
-      sendto(udp_, bytes.data(), bytes.size(), 0, reinterpret_cast<const sockaddr*>(&*client_),
-             sizeof *client_);
+    if (client_) sendBytesTo(*client_, bytes);
   }
   void send(const Record& record) { sendBytes(bytesOf(record)); }
 
