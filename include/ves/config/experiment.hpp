@@ -78,8 +78,8 @@ struct MachinePieces {
 
 /// Where the numbers of an experiment came from.
 struct Provenance {
-  Value document;       // what it was built from, URDF inside
-  int substitutes = 0;  // [-] numbers that stand in for unknown ones
+  Value document;                                // what it was built from, URDF inside
+  int substitutes = 0;                           // [-] numbers that stand in for unknown ones
   std::optional<CalibrationRecord> calibration;  // that the bias comes from
   std::vector<std::string> warnings;
   std::vector<std::string> notes;  // known oddities of a robot's file
