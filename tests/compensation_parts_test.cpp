@@ -886,6 +886,44 @@ TEST(FeedForward, ALegThatAnswersLateFollowsAParabola) {
   EXPECT_LT(std::abs(off), 2e-6);  // half of what acceleration asks for is 2e-5 m
 }
 
+// int t^n dL over two parts is that over the whole, counted from another start.
+TEST(ServoObserver, MomentsOfAMotionShiftAsIntegralsDo) {
+  ServoModel servo = experiment("z_sine", kCompensated).controller.servo;
+  servo.friction.setZero();
+  ServoObserver observer(servo, 0.01);
+  observer.reset(Vec6::Constant(1.5), 0);
+  std::vector<Vec6> lengths{observer.length()};
+  std::vector<std::pair<std::int64_t, Vec6>> between;
+  for (int k = 0; k < 10; ++k) {
+    observer.send(Vec6::Constant(1.5 + 0.01 * std::sin(0.9 * k)), k, k * kTick);
+    ServoObserver stops = observer;
+    const std::int64_t at = k * kTick + 1'100'000 + 870'000 * k;
+    stops.advance(at);
+    between.emplace_back(at, stops.length());
+    observer.advance((k + 1) * kTick);
+    lengths.push_back(observer.length());
+  }
+  const auto over = [&](int from, int to) { return observer.moments(from * kTick, to * kTick); };
+  const Motions whole = over(7, 10), first = over(7, 9), rest = over(9, 10);
+  const double s = 0.02;
+  EXPECT_LT((whole.col(0) - (lengths[10] - lengths[7])).norm(), 1e-15);
+  EXPECT_LT((first.col(0) - (lengths[9] - lengths[7])).norm(), 1e-15);
+  EXPECT_GT(rest.col(0).norm(), 1e-4);
+  for (int k = 7; k < 10; ++k) {  // where no instant is remembered
+    const auto& [at, length] = between[static_cast<std::size_t>(k)];
+    EXPECT_LT((observer.moments(7 * kTick, at).col(0) - (length - lengths[7])).norm(), 1e-8) << k;
+  }
+  EXPECT_LT((whole.col(1) - (first.col(1) + rest.col(1) + s * rest.col(0))).norm(), 1e-15);
+  EXPECT_LT(
+      (whole.col(2) - (first.col(2) + rest.col(2) + 2.0 * s * rest.col(1) + s * s * rest.col(0)))
+          .norm(),
+      1e-17);
+  EXPECT_LT((whole.col(3) - (first.col(3) + rest.col(3) + 3.0 * s * rest.col(2) +
+                             3.0 * s * s * rest.col(1) + s * s * s * rest.col(0)))
+                .norm(),
+            1e-19);
+}
+
 TEST(ServoObserver, AReadingIsComparedWithTheModelAtItsOwnTime) {
   Experiment e = experiment("z_sine", kCompensated);
   e.controller.servo.jitter = 0.0;

@@ -82,6 +82,12 @@ TEST(Ground, RowsAreTheMotionTheyAreOf) {
     EXPECT_LT((rows.at(t).x - of.at(t).x).norm(), 1e-11) << t;
     EXPECT_LT((rows.at(t).x_ddot - of.at(t).x_ddot).norm(), 1e-5) << t;
   }
+  // Where they end, it stands.
+  for (const double t : {9.99, 9.995, 12.0, 1e6}) {
+    EXPECT_EQ(rows.at(t).x, Vec6(rows.rows.col(999).head<6>())) << t;
+    EXPECT_EQ(rows.at(t).x_dot, Vec6(Vec6::Zero())) << t;
+    EXPECT_EQ(rows.at(t).x_ddot, Vec6(Vec6::Zero())) << t;
+  }
 }
 
 TEST(Ground, FreeSpaceIsTheClosedFormOfAShakenOscillator) {

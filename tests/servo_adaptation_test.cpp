@@ -201,6 +201,35 @@ TEST(ServoAdaptation, AReadingThatNoServoExplainsTeachesNothing) {
   EXPECT_EQ(one.learns().gains().delay, before.delay);
 }
 
+TEST(ServoAdaptation, AReadingCountsUpToFiveOfItsDeviations) {
+  const ServoModel believed = test::experiment("z_sine").controller.servo;
+  AdaptationSettings settings = kSettings;
+  settings.gain = 1e-9;  // of the delay alone is there doubt
+  const auto learntFrom = [&](double deviations) {
+    ModelledServos twin(believed, kPeriod, 0.5);
+    ServoAdaptation learns(believed, settings, kPeriod);
+    twin.reset(Vec6::Constant(1.5), 0);
+    learns.reset(Vec6::Constant(1.5), 0);
+    for (std::int64_t k = 0; k < 100; ++k) {
+      const double t = static_cast<double>(k) * kPeriod;
+      const Vec6 r = Vec6::Constant(1.5 + 0.02 * std::sin(2.0 * M_PI * 0.9 * t));
+      twin.send(r, k, k * kTick);
+      learns.send(r, k, k * kTick);
+      twin.advance((k + 1) * kTick);
+      const double v = twin.velocity()(0), count = believed.readings.scale(0);
+      const double variance = 4.0 * count * count / 12.0 +  // of two roundings' mean
+                              std::pow(believed.jitter * v, 2) + std::pow(settings.delay * v, 2);
+      const double off = k == 99 ? deviations * std::sqrt(variance) : 0.0;
+      learns.learn(twin.length().array() + off, (k + 1) * kTick);
+    }
+    return std::abs(learns.gains().delay(0) - believed.delay(0)) > 1e-9;
+  };
+  for (const double sign : {1.0, -1.0}) {
+    EXPECT_TRUE(learntFrom(4.9 * sign));
+    EXPECT_FALSE(learntFrom(5.1 * sign));
+  }
+}
+
 TEST(ServoAdaptation, WithoutDoubtOfTheBeliefNothingIsLearnt) {
   AdaptationSettings sure = kSettings;
   sure.gain = sure.delay = 0.0;

@@ -54,6 +54,25 @@ class Bench {
   TickInput in_;
 };
 
+TEST(TestPlatform, OnlyAWatchPassesTicksOver) {
+  Bench bench("sensor_drift");
+  constexpr std::int64_t kInterval = 180'000, kLook = 100;  // [tick]
+  std::int64_t watched = 0;
+  for (int i = 0; i < 3000 && watched < 150; ++i) {
+    const TickState& s = bench.tick();
+    const bool watches = s.kind == SegmentKind::kMonitor;
+    EXPECT_EQ(s.idle, watches && watched >= kLook - 1 ? kInterval - watched - 1 : 0) << watched;
+    watched += watches;
+  }
+  ASSERT_EQ(watched, 150);
+  bench.in().order.request = Request::kStop;  // in the middle of what it would pass over
+  for (int i = 0; i < 20; ++i) {
+    const TickState& s = bench.tick();
+    EXPECT_NE(s.kind, SegmentKind::kMonitor) << i;
+    EXPECT_EQ(s.idle, 0) << i;
+  }
+}
+
 TEST(TestPlatform, FirstCommandIsTheMeasuredPose) {
   Bench bench("z_sine");
   const LegCounts found = bench.in().sample.legs;
