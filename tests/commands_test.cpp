@@ -222,6 +222,20 @@ TEST(LegWatchdog, ACommandThatDoesNotEngageEndsAHomecomingWhereItIs) {
   EXPECT_EQ(before, kHome);
 }
 
+TEST(LegWatchdog, ASecondSilenceIsAsTheFirst) {
+  for (const bool park : {true, false}) {
+    LegWatchdog used(kTimes, all(2000), kHome), fresh(kTimes, all(2000), kHome);
+    used.take(command(2500, 2400), 0);
+    used.reference(2000 * kMs);
+    ASSERT_TRUE(used.parking());
+    for (LegWatchdog* one : {&used, &fresh}) one->take(command(3100, 3000, park), 4000 * kMs);
+    for (std::int64_t t = 4000; t <= 9000; t += 10) {
+      ASSERT_EQ(used.reference(t * kMs), fresh.reference(t * kMs)) << t << park;
+      ASSERT_EQ(used.parking(), fresh.parking()) << t << park;
+    }
+  }
+}
+
 TEST(LegWatchdog, WhoIsNoLongerEngagedStaysAtTheCheckedLengths) {
   LegWatchdog legs(kTimes, all(2000), kHome);
   legs.take(command(3100, 3000), 0);

@@ -624,6 +624,7 @@ TEST(ReactionWheels, TurnABodyThatTumbles) {
   FreeBody body(vehicle, kTick);
   body.reset(Vec6::Zero());
   const double first = body.energy();
+  const Vec6 momentum = body.momentum();  // of body and wheel
   double put_in = 0.0, most = 0.0;
   std::vector<BodyMotion> motions;
   for (int n = 0; n < 800; ++n) {
@@ -631,6 +632,7 @@ TEST(ReactionWheels, TurnABodyThatTumbles) {
     put_in += body.shaken();
     most = std::max(most, put_in);
     EXPECT_NEAR(body.energy() - first, put_in, 1e-3 * most + 1e-12);
+    EXPECT_LT((body.momentum() - momentum).norm(), 1e-8) << n;
     motions.push_back(body.bodyMotion());
   }
   for (std::size_t n = 110; n < 290; ++n)  // while the first torque lasts

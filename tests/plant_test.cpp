@@ -274,6 +274,19 @@ TEST(Plant, JointsFollowAFifthOrderPolynomial) {
   EXPECT_FALSE(plant.moveRobot(RobotMove{0, 1.0, 0.0}));
 }
 
+TEST(Plant, ItsTimeIsWhatItWasAdvancedTo) {
+  for (const char* model : {"ideal", "hydraulic"}) {
+    plant::Plant plant(experiment("puma_on_table_4_1", {std::string("legs.model=") + model}).plant);
+    for (const std::int64_t t :
+         {1L, 349'999L, 350'001L, 10'000'000L, 10'000'001L, 1'234'567'891L}) {
+      plant.advance(t);
+      EXPECT_EQ(plant.time(), t) << model;
+      EXPECT_EQ(plant.sample().time, t) << model;
+      EXPECT_EQ(plant.truth().time, t) << model;
+    }
+  }
+}
+
 TEST(Plant, CuesCountFromTheSegmentsFirstCommand) {
   Experiment e = experiment("puma_on_table_4_1");
   e.plant.task.robot_events = {{{2, 500'000'000}, RobotMove{0, 0.5, 1.0}}};
@@ -322,10 +335,10 @@ TEST(Plant, ALongLeapIsAsGoodAsManySteps) {  // what is still is passed over; wh
 // What stands for the readings from before the start was read in the same hall.
 TEST(Plant, TheFirstReadingsAreAsWarmAsTheNext) {
   const auto readings = [](const std::string& swing) {
-    Experiment e = experiment("puma_on_table_4_1",
-                              {"sensor.readings_per_tick=5", "sensor.noise=false",
-                               "sensor.temperature.swing_c=" + swing,
-                               "sensor.temperature.rising_h=-6"});  // warmest at the start
+    Experiment e = experiment(
+        "puma_on_table_4_1",
+        {"sensor.readings_per_tick=5", "sensor.noise=false", "sensor.temperature.swing_c=" + swing,
+         "sensor.temperature.rising_h=-6"});  // warmest at the start
     plant::Plant plant(e.plant);
     std::vector<Sample> out{plant.sample()};
     plant.advance(1'000'000'000);

@@ -225,6 +225,7 @@ TEST(Link, AHoldFindsRoomWhereTheQueueIsFull) {
   int waited = 0;
   while (link.takeOrder().request == Request::kOvertaken) ++waited;
   EXPECT_EQ(waited, 16);
+  EXPECT_EQ(link.rejected(), 40 - 16);
 }
 
 TEST(Link, NobodyFillsAMachinesMemoryWithOrdersToItsRobot) {

@@ -255,13 +255,13 @@ class Solver {
 /// Bulirsch and Stoer's steps, many times as long, and what is asked for between their ends.
 class LongSteps {
  public:
-  LongSteps(const Equations& equations, const InteractionOptions& options)
+  /// An interval that begins at y.
+  LongSteps(const Equations& equations, const InteractionOptions& options, const VectorXd& y)
       : rates_{&equations},
         stepper_(options.tolerance * equations.milli(), options.tolerance, 1.0, 0.0, kLongest,
-                 true) {}
-
-  /// An interval, from now on.
-  void begin(const VectorXd& y) { stepper_.initialize(stateOf(y), 0.0, kFirst); }
+                 true) {
+    stepper_.initialize(stateOf(y), 0.0, kFirst);
+  }
 
   /// `later` [s] in it, no earlier than what was asked last.
   void advance(double later, VectorXd& y) {
@@ -345,7 +345,6 @@ std::vector<InteractionPoint> simulate(const Interaction& interaction,
   VectorXd y = equations.start();
 
   Solver solver(equations, options);
-  LongSteps long_steps(equations, options);
   std::vector<InteractionPoint> out{equations.point(0, y)};
   const auto keep = [&](std::int64_t time) {
     if (time % options.step == 0) out.push_back(equations.point(time, y));
@@ -359,12 +358,12 @@ std::vector<InteractionPoint> simulate(const Interaction& interaction,
     } else if (equations.holdsAStep()) {
       for (double later = 0.0; later < since(until);) later = solver.step(later, since(until), y);
     } else {
-      long_steps.begin(y);
+      LongSteps steps(equations, options, y);
       for (std::int64_t at = nextStep(now, options); at < until; at += options.step) {
-        long_steps.advance(since(at), y);
+        steps.advance(since(at), y);
         keep(at);
       }
-      long_steps.advance(since(until), y);
+      steps.advance(since(until), y);
     }
     keep(until);
   };
