@@ -5,6 +5,7 @@
 #include <boost/numeric/odeint/stepper/bulirsch_stoer_dense_out.hpp>
 #include <boost/numeric/odeint/stepper/controlled_runge_kutta.hpp>
 #include <boost/numeric/odeint/stepper/runge_kutta_cash_karp54.hpp>
+#include <cmath>
 #include <stdexcept>
 #include <vector>
 
@@ -258,8 +259,8 @@ class LongSteps {
   /// An interval that begins at y.
   LongSteps(const Equations& equations, const InteractionOptions& options, const VectorXd& y)
       : rates_{&equations},
-        stepper_(options.tolerance * equations.milli(), options.tolerance, 1.0, 0.0, kLongest,
-                 true) {
+        stepper_(kOfLong * options.tolerance * equations.milli(), kOfLong * options.tolerance, 1.0,
+                 0.0, kLongest, true) {
     stepper_.initialize(stateOf(y), 0.0, kFirst);
   }
 
@@ -272,8 +273,9 @@ class LongSteps {
   }
 
  private:
-  // Where all stands, a step looks at too little to see what begins later.
-  static constexpr double kFirst = 1e-3, kLongest = 0.25;  // [s]
+  static constexpr double kOfLong = 0.1;  // [-] of the tolerance that is asked for
+  // A short first step would be of low order; a long one where all stands sees too little.
+  static constexpr double kFirst = 0.05, kLongest = 0.25;  // [s]
 
   void step() {
     try {
@@ -324,6 +326,17 @@ void passContacts(Solver& solver, Equations& equations, double over, VectorXd& y
   }
 }
 
+/// [ns] in order, and one that is never: where actions begin and end, the motion is less smooth.
+std::vector<std::int64_t> kinksOf(const std::vector<TimedAction>& actions) {
+  std::vector<std::int64_t> out{INT64_MAX};
+  for (const TimedAction& one : actions) {
+    out.push_back(one.start);
+    out.push_back(one.start + std::llround(durationOf(one.action) * 1e9));
+  }
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
 std::int64_t nextStep(std::int64_t now, const InteractionOptions& options) {
   return (now / options.step + 1) * options.step;
 }
@@ -368,6 +381,7 @@ std::vector<InteractionPoint> simulate(const Interaction& interaction,
     keep(until);
   };
   const std::int64_t end = options.duration - options.duration % options.step;
+  const std::vector<std::int64_t> kinks = kinksOf(interaction.actions);
   auto next = interaction.actions.begin();
   for (std::int64_t now = 0; now < end;) {
     equations.begin(now, now / options.step, y);
@@ -375,7 +389,7 @@ std::vector<InteractionPoint> simulate(const Interaction& interaction,
       equations.begin(next->action, y);
     std::int64_t until = equations.pushEnds(end);
     if (equations.holdsAStep()) until = std::min(until, nextStep(now, options));
-    if (next != interaction.actions.end()) until = std::min(until, next->start);
+    until = std::min(until, *std::upper_bound(kinks.begin(), kinks.end(), now));
     try {
       pass(now, until);
     } catch (const Diverges&) {
