@@ -883,7 +883,7 @@ TEST(FeedForward, ALegThatAnswersLateFollowsAParabola) {
     if (k > 100) off += (leg.L - at.L(0)) / 99.0;
     leg.run(references[static_cast<std::size_t>(std::max(0, k - 3))], T);
   }
-  EXPECT_LT(std::abs(off), 2e-6);  // half of what acceleration asks for is 2e-5 m
+  EXPECT_LT(std::abs(off), 2e-6);  // the term with the acceleration is 3e-5 m here
 }
 
 // int t^n dL over two parts is that over the whole, counted from another start.

@@ -85,11 +85,6 @@ class Equations {
   bool holdsAStep() const {
     return hasWorld() || each([](const auto& v) { return v.holdsAStep(); });
   }
-  /// [ns] when the push ends that lasts now; `otherwise`: none does.
-  std::int64_t pushEnds(std::int64_t otherwise) const {
-    return pushing() ? std::min(otherwise, push_->end()) : otherwise;
-  }
-
   void derivative(double later, const VectorXd& y, VectorXd& dy) const {
     const JointState q = robot_.at(now_, later);
     const double t = seconds(now_) + later;
@@ -326,7 +321,8 @@ void passContacts(Solver& solver, Equations& equations, double over, VectorXd& y
   }
 }
 
-/// [ns] in order, and one that is never: where actions begin and end, the motion is less smooth.
+/// [ns] where actions begin and end, in order, and one past all others. The motion is smooth
+/// between them, and a push begins and ends with an interval.
 std::vector<std::int64_t> kinksOf(const std::vector<TimedAction>& actions) {
   std::vector<std::int64_t> out{INT64_MAX};
   for (const TimedAction& one : actions) {
@@ -387,9 +383,8 @@ std::vector<InteractionPoint> simulate(const Interaction& interaction,
     equations.begin(now, now / options.step, y);
     for (; next != interaction.actions.end() && next->start <= now; ++next)
       equations.begin(next->action, y);
-    std::int64_t until = equations.pushEnds(end);
+    std::int64_t until = std::min(end, *std::upper_bound(kinks.begin(), kinks.end(), now));
     if (equations.holdsAStep()) until = std::min(until, nextStep(now, options));
-    until = std::min(until, *std::upper_bound(kinks.begin(), kinks.end(), now));
     try {
       pass(now, until);
     } catch (const Diverges&) {

@@ -447,7 +447,7 @@ BodyMotion ModalVehicle::atWrench() const noexcept {
   if (ground_.moves()) x_dot += now_.ground.x_dot;
   BodyMotion out = ves::bodyMotion(Vec3::Zero(), Pose::from(coordinates(now_.modes, now_.ground)),
                                    x_dot, Vec6::Zero());
-  out.alpha = Vec3::Zero();  // also of the axes that the angles turn about
+  out.alpha = Vec3::Zero();  // with the angles' rates held it is not zero: their axes turn
   return out;
 }
 

@@ -71,10 +71,10 @@ struct InteractionPoint {
   ContactWatch contacts;  // up to now
 };
 
-/// Bulirsch and Stoer's steps, by Boost, interpolated at the points; where something is held from
-/// step to step, or may touch, Cash and Karp's Runge-Kutta 5(4) in its place, and where the tool
-/// begins or ceases to touch, a step ends to 1e-12 s. Throws std::domain_error when the tolerance cannot
-/// be kept.
+/// By Boost: Bulirsch and Stoer's extrapolation, interpolated at the points. Cash and Karp's
+/// Runge-Kutta 5(4) takes its place where something is held from step to step, or the tool may
+/// touch; where it begins or ceases to, a step ends to 1e-12 s. Throws std::domain_error when the
+/// tolerance cannot be kept.
 std::vector<InteractionPoint> simulate(const Interaction& interaction,
                                        const InteractionOptions& options);
 
