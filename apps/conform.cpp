@@ -49,15 +49,12 @@ std::vector<Requirement> listen(const Experiment& experiment, const std::string&
   return judge->verdict(monotonicNow());
 }
 
-/// Arms, 20 mm up and tilted so that every leg goes a way of its own, home again, parks.
+/// Arms, 20 mm up and tilted so that every leg goes a way of its own, rests there, home again,
+/// parks.
 std::vector<Requirement> move(const Experiment& experiment, const ProcessOptions& process) {
-  Mat6 apart = Mat6::Zero();  // [m^2] row: a leg as measured; column: a leg as told
+  LegJudge legs;
   const RunResult result = runController(experiment, process, [&](const TickState& s) {
-    if (s.command.engaged)
-      apart += (s.L_measured.replicate<1, 6>() - s.legs.L.transpose().replicate<6, 1>())
-                   .array()
-                   .square()
-                   .matrix();
+    legs.take(s);
     return stop_requested ? Order{Request::kStop, {}, {}} : Order();
   });
   Requirement moved{"a gentle move", "arms, 20 mm up and back, parks", "",
@@ -65,18 +62,7 @@ std::vector<Requirement> move(const Experiment& experiment, const ProcessOptions
   moved.found =
       moved.kept ? fmt::format("parked after {:.1f} s", result.simulated) : whyNot(result);
   if (moved.found.empty()) moved.found = "ended early";
-  // A leg lags behind what it was told, and is farther from what another was.
-  std::string crossed;
-  for (int i = 0; i < kLegs; ++i) {
-    Eigen::Index nearest = 0;
-    apart.row(i).minCoeff(&nearest);
-    if (nearest != i)
-      crossed += fmt::format("{}leg {} goes as leg {} is told", crossed.empty() ? "" : ", ", i + 1,
-                             nearest + 1);
-  }
-  return {moved,
-          {"which leg", "each goes the way it is told", crossed.empty() ? "all do" : crossed,
-           crossed.empty()}};
+  return {moved, legs.verdict()};
 }
 
 /// Follows commands a millimetre ahead of where it is to rest, and then hears no more.
@@ -150,7 +136,8 @@ int conformCommand(int argc, char** argv) {
         throw InputError("--set program: means nothing here, the motion is this command's own");
     options.overrides.push_back(
         "program=[{move: {}}, {move: {to: {x_m: 0.01, y_m: -0.008, z_m: 0.02, alpha_deg: 2, "
-        "beta_deg: -1.5, gamma_deg: 1}, duration_s: 2}}, {move: {}}]");
+        "beta_deg: -1.5, gamma_deg: 1}, duration_s: 2}}, {move: {to: {x_m: 0.01, y_m: -0.008, "
+        "z_m: 0.02, alpha_deg: 2, beta_deg: -1.5, gamma_deg: 1}, duration_s: 2}}, {move: {}}]");
     const Experiment experiment = options.load();
     if (options.verbose) printWarnings(experiment, true);
     options.enterBus();

@@ -214,6 +214,43 @@ TEST(Conform, BytesThatAreNoSampleAreCounted) {
   EXPECT_EQ(all[1].found, "1 malformed");
 }
 
+/// Told from home away in two seconds and held there; row i of `as` answers leg i, late by `ticks`,
+/// and samples come every `every` ticks.
+std::string whichLeg(const std::array<int, 6>& as, int ticks, int every = 1) {
+  const Vec6 home = Vec6::Constant(1.4);
+  Vec6 away;
+  away << 0.012, 0.030, 0.027, 0.008, 0.016, 0.005;
+  const auto told = [&](int tick) -> Vec6 {
+    return home + away * std::clamp(0.005 * tick, 0.0, 1.0);
+  };
+  LegJudge judge;
+  for (int tick = 0; tick < 400; ++tick) {
+    TickState s;
+    s.command.engaged = true;
+    s.sample_sequence = tick / every;
+    s.legs.L = told(tick);
+    const Vec6 late = told(tick / every * every - ticks);
+    for (int i = 0; i < 6; ++i) s.L_measured(i) = late(as[static_cast<std::size_t>(i)]) + 4e-4;
+    judge.take(s);
+  }
+  return judge.verdict().kept ? "" : judge.verdict().found;
+}
+
+TEST(Conform, AMachineThatAnswersLateStillMovesTheLegsItIsTold) {
+  for (const int late : {0, 10, 50}) {
+    EXPECT_EQ(whichLeg({0, 1, 2, 3, 4, 5}, late), "") << late;
+    EXPECT_EQ(whichLeg({0, 2, 1, 3, 4, 5}, late),
+              "leg 2 goes as leg 3 is told, leg 3 goes as leg 2 is told")
+        << late;
+    EXPECT_EQ(whichLeg({5, 1, 2, 3, 4, 0}, late),
+              "leg 1 goes as leg 6 is told, leg 6 goes as leg 1 is told")
+        << late;
+  }
+  EXPECT_EQ(whichLeg({0, 1, 2, 3, 4, 5}, 40, 3), "");
+  // Too few samples came while it rested: nothing is known.
+  EXPECT_EQ(whichLeg({0, 1, 2, 3, 4, 5}, 40, 5), "never at rest away from home");
+}
+
 using ConformProgram = test::Programs;
 
 TEST_F(ConformProgram, OurOwnPlantKeepsAllAndMoves) {

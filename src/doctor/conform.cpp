@@ -166,4 +166,32 @@ std::vector<Requirement> SampleJudge::verdict(std::int64_t now) const {
   return out;
 }
 
+void LegJudge::take(const TickState& state) {
+  constexpr int kSettled = 50;     // [-] ticks
+  constexpr double kAway = 0.001;  // [m] between the longest and the shortest leg
+  if (state.legs.L != told_) settled_ = 0;
+  if (state.sample_sequence > sequence_) ++settled_;
+  told_ = state.legs.L;
+  sequence_ = state.sample_sequence;
+  if (!state.command.engaged || settled_ <= kSettled || told_.maxCoeff() - told_.minCoeff() < kAway)
+    return;
+  seen_ = true;
+  for (int i = 0; i < kLegs; ++i)
+    apart_.row(i) += (told_.array() - state.L_measured(i)).square().matrix().transpose();
+}
+
+Requirement LegJudge::verdict() const {
+  Requirement out{"which leg", "each goes the way it is told",
+                  seen_ ? "" : "never at rest away from home", false};
+  for (int i = 0; seen_ && i < kLegs; ++i) {
+    Eigen::Index nearest = 0;
+    apart_.row(i).minCoeff(&nearest);
+    if (nearest != i)
+      out.found += fmt::format("{}leg {} goes as leg {} is told", out.found.empty() ? "" : ", ",
+                               i + 1, nearest + 1);
+  }
+  if (out.found.empty()) out = {out.name, out.asked, "all do", true};
+  return out;
+}
+
 }  // namespace ves

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "ves/bus/messages.hpp"
+#include "ves/contract/tick_state.hpp"
 
 namespace ves {
 
@@ -55,6 +56,21 @@ class SampleJudge {
   Span pressure_;
   std::array<Span, 6> channels_, legs_;  // [count]
   std::string joints_;                   // the first that is wrong
+};
+
+/// Judges whether each leg goes the way that it is told, while the platform is moved about. Where
+/// it rests only: on the way a machine that answers late is nearer to a leg that goes less far.
+class LegJudge {
+ public:
+  void take(const TickState& state);
+  Requirement verdict() const;
+
+ private:
+  Mat6 apart_ = Mat6::Zero();   // [m^2] row: a leg as measured; column: a leg as told
+  Vec6 told_ = Vec6::Zero();    // [m]
+  std::int64_t sequence_ = -1;  // of the last sample
+  int settled_ = 0;             // [-] ticks with a new sample since the legs' order changed
+  bool seen_ = false;           // at rest away from home
 };
 
 }  // namespace ves
