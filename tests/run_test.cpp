@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// When a run is over and what it came to, the folders it leaves, the lines that it shows.
+// When a run is over and what it came to, the folders it leaves, the lines that it shows; that the
+// table of faults says so where a machine does not react.
 #include <gtest/gtest.h>
 
 #include <fmt/format.h>
@@ -13,6 +14,8 @@
 
 #include "support/refusal.hpp"
 #include "support/rig.hpp"
+#include "ves/faults/soak.hpp"
+#include "ves/faults/table.hpp"
 #include "ves/results/results.hpp"
 #include "ves/run/flight_record.hpp"
 #include "ves/run/run_monitor.hpp"
@@ -189,6 +192,86 @@ TEST_F(Folders, AFlightRecordIsOfTheLastFiveSecondsOfEachStop) {
   ASSERT_EQ(second.size(), 129U);  // since the record before
   EXPECT_EQ(second.front(), 751);
   EXPECT_EQ(second.back(), 879);
+}
+
+// --- The table of faults -------------------------------------------------------------------------
+
+FaultOutcome outcomeOf(const std::string& id, const std::vector<std::string>& sets,
+                       double amplitude = 1.0) {
+  FaultBench bench;
+  bench.config = test::configDir();
+  bench.sets = sets;
+  bench.amplitude = amplitude;
+  for (const FaultRow& row : faultTable(bench))
+    if (row.id == id) return row.run();
+  ADD_FAILURE() << "no row " << id;
+  return {};
+}
+
+// ctest runs the table on a machine that reacts to all of it; here each row meets one whose check
+// is out of reach, or trips too soon.
+TEST(FaultTable, SaysSoWhereTheReactionIsGone) {
+  const std::string calm = "safety.position_error_m=9",
+                    calm_at_rest = "safety.position_error_still_m=9";
+  const std::vector<std::pair<const char*, std::vector<std::string>>> gone = {
+      {"F1", {"safety.stale_ticks=0"}},
+      {"F2", {"safety.stale_ticks=1000"}},
+      {"F3", {"safety.frozen_samples=1000"}},
+      {"F5", {"safety.start_force_n=10000"}},
+      {"F8", {"safety.stale_ticks=1000"}},
+      {"F8", {"safety.stale_ticks=6"}},  // stopped, but too late
+      {"F10b", {"safety.reading_jump_m=9"}},
+      {"F11", {"safety.reading_patience=0"}},
+      {"F11b", {"safety.reading_jump_m=9"}},
+      {"F12", {calm, calm_at_rest}},
+      {"F16", {"safety.stall_ticks=1000"}},
+      {"F16", {"safety.stall_ticks=1000", "safety.leg_velocity_m_per_s=10"}},  // no burst, no stop
+      {"F17", {"safety.overruns_per_second=0"}},
+      {"F17b", {"safety.overruns_per_second=1000"}},
+      {"F28", {"safety.leg_velocity_m_per_s=10", "safety.flow_l_per_s=1000"}},
+      {"F31", {"safety.pressure_min_v=-10"}},
+      {"F31b", {"safety.pressure_min_v=-10"}},
+      {"F38", {"safety.pressure_min_v=-10"}}};  // stopped, but pressure is not recorded
+  for (const auto& [id, sets] : gone) {
+    const FaultOutcome seen = outcomeOf(id, sets);
+    EXPECT_FALSE(seen.as_expected) << id << " with " << sets.front() << ": " << seen.what;
+  }
+}
+
+TEST(FaultTable, TellsWhatWasMeasured) {
+  // Samples stop two seconds into the segment, with that tick's.
+  for (const int limit : {2, 4}) {
+    const FaultOutcome stale = outcomeOf("F8", {fmt::format("safety.stale_ticks={}", limit)});
+    EXPECT_TRUE(stale.as_expected) << stale.what;
+    EXPECT_EQ(stale.ticks, limit);
+    EXPECT_EQ(stale.period, 0.01);
+  }
+  // A swing of 0.2 m times the share that is asked for; the legs lag in proportion.
+  const double whole = outcomeOf("F31", {"safety.pressure_min_v=-10"}).peak_deviation;
+  EXPECT_GT(whole, 0.02);
+  EXPECT_LT(whole, 0.1);
+  for (const double share : {0.5, 0.25}) {
+    const FaultOutcome part = outcomeOf("F31", {"safety.pressure_min_v=-10"}, share);
+    const std::size_t at = part.what.find("at most ");
+    ASSERT_NE(at, std::string::npos) << part.what;
+    EXPECT_NEAR(std::stod(part.what.substr(at + 8)), 200.0 * share, 2.0) << part.what;
+    EXPECT_NEAR(part.peak_deviation, whole * share, 0.02 * whole * share) << share;
+  }
+}
+
+TEST(Soak, IsTheSameForOneSeedAndCountsWhatItDid) {
+  const Experiment e = test::experiment("puma_on_table_4_1");
+  std::vector<std::int64_t> told;
+  const SoakResult first = soak(e, 5'000, 1, [&](std::int64_t tick) { told.push_back(tick); }),
+                   again = soak(e, 5'000, 1, nullptr), other = soak(e, 5'000, 2, nullptr);
+  EXPECT_EQ(told, std::vector<std::int64_t>({0}));
+  EXPECT_EQ(first.ticks, 5'000);
+  EXPECT_EQ(first.violated, "");
+  EXPECT_GT(first.faults, 0);
+  EXPECT_GE(first.stops, first.recoveries);
+  EXPECT_GT(first.recoveries, 0);
+  EXPECT_EQ(first.hash, again.hash);
+  EXPECT_NE(first.hash, other.hash);
 }
 
 }  // namespace
