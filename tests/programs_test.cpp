@@ -562,6 +562,7 @@ TEST_F(Programs, ThoseWhoNameAPrivateBusAreOnOneNetworkAndNobodyElse) {
   const Output open = sh(app("on-bus") + "a true");
   EXPECT_EQ(open.status, 2);
   EXPECT_NE(open.text.find("only this user"), std::string::npos) << open.text;
+  unsetenv("XDG_RUNTIME_DIR");
 }
 
 TEST_F(Programs, SecondControllerRefusesToArmAndTheFirstGoesOn) {
