@@ -129,7 +129,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadLine{"vehicle mass 2 mass 3", "mass: given twice"},
         BadLine{"vehicle weight 2", "'weight', want mass, damping, stiffness or in"},
         BadLine{"trajectory 3 z", "z: ramp or sine: missing"},
-        BadLine{"trajectory 3 w sine 1 1", "'w', want one of x, y, z"},
+        BadLine{"trajectory 3 w sine 1 1", "'w', want one of x, y, z, alpha, beta, gamma"},
         BadLine{"trajectory 3 z jump 1", "z: 'jump', want ramp or sine"},
         BadLine{"trajectory 3 z sine 306 1", "[-305, 305] mm"},
         BadLine{"trajectory 3 alpha ramp 31", "[-30, 30] deg"},

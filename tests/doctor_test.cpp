@@ -4,6 +4,8 @@
 #include "ves/doctor/doctor.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <functional>
 
@@ -13,6 +15,59 @@
 
 namespace ves {
 namespace {
+
+// What it waited for and what it passed over are all periods since it began, whatever else the
+// machine does meanwhile.
+TEST(Ticker, CountsEveryPeriodOnceAndSaysHowLateItWoke) {
+  constexpr std::int64_t kPeriod = 4'000'000;  // [ns]
+  const std::int64_t before = monotonicNow();
+  Ticker ticker(kPeriod);
+  const std::int64_t begun = monotonicNow();
+  std::int64_t periods = 0, missed = 0;
+  for (int i = 0; i < 12; ++i) {
+    const std::int64_t over = monotonicNow();
+    if (i % 4 == 3)  // a tick that takes three and a half
+      while (monotonicNow() < over + 7 * kPeriod / 2) {
+      }
+    const std::int64_t passed = ticker.wait();
+    const std::int64_t now = monotonicNow();
+    if (i % 4 == 3) {
+      EXPECT_GE(passed, 2);
+    }
+    missed += passed;
+    periods += passed + 1;
+    EXPECT_EQ(ticker.missed(), missed);
+    EXPECT_GE(now, before + periods * kPeriod);  // never too soon
+    EXPECT_GE(ticker.late(), 0);
+    EXPECT_LE(ticker.late(), now - (before + periods * kPeriod));
+    EXPECT_GE(ticker.late(), over - (begun + periods * kPeriod));
+    // The next one's time has not come yet, or it would have been passed over.
+    EXPECT_LE(over, begun + periods * kPeriod + kPeriod);
+  }
+}
+
+/// In a process of its own, without the right to either: 0 where claimRealtime() did as it should.
+int refusedRealtime() {
+  const rlimit none{0, 0};
+  setrlimit(RLIMIT_RTPRIO, &none);
+  setrlimit(RLIMIT_MEMLOCK, &none);
+  if (geteuid() == 0 && setuid(65534) != 0) return 77;
+  const std::string said = claimRealtime(80, false);
+  const std::size_t fifo = said.find("SCHED_FIFO refused: "),
+                    memory = said.find("; locked memory refused: ");
+  if (fifo != 0 || memory == std::string::npos) return 1;
+  try {
+    claimRealtime(80, true);
+  } catch (const InputError& error) {
+    return error.what() == "--realtime: " + said + " (see ulimit -r and -l, or run as root)" ? 0
+                                                                                             : 2;
+  }
+  return 3;
+}
+
+TEST(ClaimRealtime, SaysAllThatIsRefusedAndThrowsWhereItIsRequired) {
+  EXPECT_EXIT(_exit(refusedRealtime()), testing::ExitedWithCode(0), "");
+}
 
 TEST(Latency, IsTheOrderStatistics) {
   std::vector<double> all;

@@ -59,6 +59,7 @@ TEST_F(Replay, RepeatsEveryStateAndCommand) {
   EXPECT_GT(r.ticks, 1900);
   EXPECT_EQ(r.messages, 2 * r.ticks);
   EXPECT_EQ(r.different, 0);
+  EXPECT_TRUE(r.pose_difference.isZero(0.0));
   EXPECT_EQ(r.phase, Phase::kParked);
 }
 

@@ -2,15 +2,19 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
+#include <complex>
 #include <filesystem>
+#include <fstream>
 #include <regex>
 
+#include "support/refusal.hpp"
 #include "support/rig.hpp"
 #include "ves/analysis/loop.hpp"
 #include "ves/evaluation/let_go.hpp"
 #include "ves/math/dense.hpp"
 #include "ves/run/run.hpp"
 #include "ves/validation/chapter4.hpp"
+#include "ves/validation/claims.hpp"
 #include "ves/validation/page.hpp"
 
 namespace ves {
@@ -149,6 +153,51 @@ TEST(VesOnTheArm, IsSrmsRobotLateByTheSensorWhenTheArmHardlyGives) {
   EXPECT_NEAR(best, 16.3, 3.0);
   EXPECT_LT(apart(best), 0.02);
   EXPECT_GT(apart(0), 2.0 * apart(best));
+}
+
+// --- Claims --------------------------------------------------------------------------------------
+
+TEST(Claims, AreJudgedByTheirRangesEndsIncluded) {
+  const fs::path file = fs::temp_directory_path() / fmt::format("ves_claims_{}.yaml", getpid());
+  const auto written = [&](const std::string& more) {
+    std::ofstream(file) << "claims:\n  one:\n    where: \"1\"\n    says: s\n    why: w\n"
+                           "    reached: \"{a:.1f} of {b:.0f}\"\n"
+                        << more;
+    return Claims(file);
+  };
+  const Claims ranges = written("    agrees: {a: [1, 2], b: [-3, 3]}\n");
+  EXPECT_EQ(ranges.ids(), std::vector<std::string>({"one"}));
+  const auto verdict = [&](double a, double b) {
+    return ranges.judge("one", {{"a", a}, {"b", b}, {"c", 1e9}}).verdict;
+  };
+  for (const double a : {1.0, 1.5, 2.0})
+    for (const double b : {-3.0, 0.0, 3.0}) EXPECT_EQ(verdict(a, b), Verdict::kAgrees) << a << b;
+  for (const double a : {0.99, 2.01, double(NAN), HUGE_VAL})
+    EXPECT_EQ(verdict(a, 0.0), Verdict::kDiffers) << a;
+  for (const double b : {-3.01, 3.01, double(NAN)})
+    EXPECT_EQ(verdict(1.5, b), Verdict::kDiffers) << b;
+  const Claim said = ranges.judge("one", {{"a", 1.25}, {"b", 2.0}});
+  EXPECT_EQ(said.reached, "1.2 of 2");
+  EXPECT_EQ(said.where + said.says + said.why, "1sw");
+
+  EXPECT_EQ(written("").judge("one", {{"a", 1.0}, {"b", 1.0}}).verdict, Verdict::kCannotTell);
+  EXPECT_EQ(written("    range: true\n").judge("one", {{"a", 1.0}, {"b", 1.0}}).verdict,
+            Verdict::kRange);
+
+  const auto refused = [&](const auto& what) { return test::refusal(what); };
+  EXPECT_NE(refused([&] { ranges.judge("two", {}); }).find("no claim 'two'"), std::string::npos);
+  EXPECT_NE(refused([&] {
+              ranges.judge("one", {{"a", 1.0}});
+            }).find("claims.one.reached"),
+            std::string::npos);
+  const Claims third = written("    agrees: {c: [0, 1]}\n");
+  EXPECT_NE(refused([&] {
+              third.judge("one", {{"a", 1.0}, {"b", 1.0}});
+            }).find("claims.one.agrees: c: is not measured"),
+            std::string::npos);
+  EXPECT_NE(refused([&] { written("    agrees: {a: [2, 1]}\n"); }).find("the lower end first"),
+            std::string::npos);
+  fs::remove(file);
 }
 
 // --- The page ------------------------------------------------------------------------------------
@@ -343,6 +392,45 @@ void expectSaidAsMeasured(const Chapter4& chapter) {
   expectTable("SRMS-robot [Hz]", "zeta", damping);
 }
 
+/// A leg in the frequency domain, in its own way: a LegSlave (2.16) that reads in the mean half a
+/// reading ago and holds its current for three, a valve and a piston (2.17).
+void expectServosLagAsTheirLoopSays(const Chapter4& chapter) {
+  using namespace std::complex_literals;
+  const plant::PlantConfig p = test::experiment("z_sine").plant;
+  const double reading = static_cast<double>(kTransducerPeriod) * 1e-9;
+  const double amperes = plant::LegSlave::kVoltsPerDigit * plant::LegSlave::kAmperesPerVolt /
+                         (256.0 * p.transducer.scale);  // [A/m] of a gain of one
+  const auto phase = [&](double K, double w) {
+    const std::complex<double> s = 1i * w;
+    const std::complex<double> hold = std::exp(-1.5 * reading * s),
+                               late = std::exp(-0.5 * reading * s);
+    const std::complex<double> to_velocity = K * amperes * hold / (p.actuator.tau * s + 1.0);
+    const std::complex<double> back =
+        late *
+        (double(p.leg_slave.K_P) + double(p.leg_slave.K_D) * (1.0 - std::exp(-12.0 * reading * s)));
+    return std::arg(to_velocity * double(p.leg_slave.K_P) / (s + to_velocity * back));
+  };
+  const auto lag = [&](double K) {   // [Hz] where the answer is 90 degrees behind
+    double low = 0.1, high = 100.0;  // [rad/s]
+    for (int i = 0; i < 60; ++i) {
+      const double w = 0.5 * (low + high), at = phase(K, w);
+      (at > -0.5 * M_PI && at < 0.5 ? low : high) = w;
+    }
+    return low / (2.0 * M_PI);
+  };
+  const auto& servo = chapter.summary["servo"];
+  const double extending = servo["quarter_period_lag_extending_hz"],
+               retracting = servo["quarter_period_lag_retracting_hz"];
+  EXPECT_NEAR(extending, lag(p.actuator.gain_extend), 0.01 * extending);
+  EXPECT_NEAR(retracting, lag(p.actuator.gain_retract), 0.01 * retracting);
+  for (const auto& claim : chapter.summary["claims"])
+    if (claim["where"] == "2.4") {
+      EXPECT_EQ(claim["reached"],
+                fmt::format("90 degrees behind at {:.1f} Hz extending, {:.1f} Hz retracting",
+                            extending, retracting));
+    }
+}
+
 TEST(Chapter4, EveryClaimHasItsVerdict) {
   const fs::path folder = fs::temp_directory_path() / ("ves_chapter4_" + std::to_string(getpid()));
   fs::create_directories(folder);
@@ -396,6 +484,7 @@ TEST(Chapter4, EveryClaimHasItsVerdict) {
   }
   EXPECT_EQ(runs, 8);
   expectSaidAsMeasured(chapter);
+  expectServosLagAsTheirLoopSays(chapter);
   EXPECT_EQ(chapter.summary["divergence"]["ended"], "stopped");
 }
 #endif

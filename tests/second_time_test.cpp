@@ -18,6 +18,7 @@ struct Case {
   const char* scenario;
   std::vector<std::string> set;
 };
+std::ostream& operator<<(std::ostream& out, const Case& one) { return out << one.name; }
 const std::vector<std::string> kBare = {
     "controller.compensation.feed_forward=false", "controller.compensation.observer=false",
     "controller.compensation.inertia=false", "controller.compensation.wrench=raw"};
@@ -127,8 +128,7 @@ INSTANTIATE_TEST_SUITE_P(
                          {"controller.wrench_filter.dead_band_n_or_nm=[1,1,1,0.1,0.1,0.1]",
                           "controller.wrench_filter.low_pass_hz=[5,5,5,5,5,5]"}},
                     Case{"shuttle", "srms_low_hover_puma", {}},
-                    Case{"satellite", "satellite_puma", {}}, Case{"ship", "ship_arm", {}}),
-    [](const auto& test) { return std::string(test.param.name); });
+                    Case{"satellite", "satellite_puma", {}}, Case{"ship", "ship_arm", {}}));
 
 // What a vehicle that floats has of a force is the force times the time, however seldom its samples
 // come.

@@ -395,7 +395,8 @@ TEST_F(PrivateBus, AMachinesClockIsKnownFromWhatGoesToAndFro) {
 
 TEST_F(PrivateBus, WhoComesLateHearsTheConfiguration) {
   Bus late(kDefaultUrl), controller(kDefaultUrl);
-  std::int64_t heard = 0, sequence = -1;
+  const std::int64_t begun = monotonicNow();
+  std::int64_t heard = 0, sequence = -1, told = 0;
   late.subscribe({channel::kExperiment},
                  [&](const std::string&, const void* data, std::uint32_t size) {
                    const auto m = decode<experiment_t>(data, size);
@@ -403,6 +404,9 @@ TEST_F(PrivateBus, WhoComesLateHearsTheConfiguration) {
                    EXPECT_EQ(m->resolved, "name: x");
                    EXPECT_GT(m->header.sequence, sequence);
                    sequence = m->header.sequence;
+                   EXPECT_GT(m->header.time_ns, std::max(told, begun - 1));
+                   told = m->header.time_ns;
+                   EXPECT_LE(told, monotonicNow());
                    ++heard;
                  });
   experiment_t experiment;
@@ -417,6 +421,8 @@ TEST_F(PrivateBus, WhoComesLateHearsTheConfiguration) {
     ASSERT_TRUE(m);
     EXPECT_EQ(m->arming_samples, 77);
     EXPECT_EQ(m->header.source, 7);
+    EXPECT_EQ(m->header.sequence, sequence);  // after the configuration it belongs to
+    EXPECT_EQ(m->header.time_ns, told);
     ++setups;
   });
   Announcer announcer(controller, kDefaultUrl, experiment, setup);

@@ -114,6 +114,38 @@ TEST(Scene, LegsReachFromJointToJoint) {
   }
 }
 
+// Whatever the order of the joints: each is a corner, and a turn to the left follows at each.
+TEST(Scene, APlateGoesRoundItsJointsAtTheirMeanHeight) {
+  for (const char* scenario : {"free_decay", "arm_on_desk", "puma_on_hall"}) {
+    const Experiment e = test::experiment(scenario);
+    const Scene scene(e);
+    const Geometry& g = e.plant.geometry;
+    int plates = 0;
+    for (const auto& shape : scene.description()["shapes"]) {
+      if (shape["kind"] != "plate") continue;
+      const auto& joints = shape["frame"] == "platform" ? g.p_PPi_P : g.p_IBi_I;
+      std::vector<Eigen::Vector2d> corners;
+      for (const auto& corner : shape["corners"]) corners.emplace_back(corner[0], corner[1]);
+      ASSERT_EQ(corners.size(), joints.size());
+      double height = 0.0;
+      for (const Vec3& joint : joints) {
+        EXPECT_TRUE(std::any_of(corners.begin(), corners.end(), [&](const auto& corner) {
+          return (corner - joint.head<2>()).norm() < 1e-9;
+        }));
+        height += joint.z() / kLegs;
+      }
+      EXPECT_NEAR(shape["top"].get<double>(), height, 1e-12);
+      for (std::size_t i = 0; i < kLegs; ++i) {
+        const Eigen::Vector2d to = corners[(i + 1) % kLegs] - corners[i],
+                              on = corners[(i + 2) % kLegs] - corners[(i + 1) % kLegs];
+        EXPECT_GT(to.x() * on.y() - to.y() * on.x(), 0.0) << scenario << i;
+      }
+      ++plates;
+    }
+    EXPECT_EQ(plates, 2) << scenario;
+  }
+}
+
 TEST(Scene, TheToolIsAtTheEndOfTheLinks) {
   const RecordedRun run = puma();
   const Experiment& e = run.series.experiment;
