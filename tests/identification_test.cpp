@@ -332,6 +332,16 @@ TEST(IterativeCompensation, DivergesOnALightlyDampedBase) {
   EXPECT_GT(r.changes.back().translation, 2.0 * r.changes.front().translation);
 }
 
+TEST(IterativeCompensation, SaysWhichCheckStoppedAPass) {
+  std::vector<std::string> without_oil = kShort;
+  without_oil.push_back("sensor.pressure_v=1");
+  const IterativeResult r =
+      compensateIteratively(test::experiment("puma_on_table_4_1", without_oil), {}, {});
+  EXPECT_FALSE(r.converged);
+  EXPECT_EQ(r.stopped_by, Check::kPressure);
+  EXPECT_TRUE(r.changes.empty());
+}
+
 TEST(RecordedPath, IsGoneThroughColumnByColumnAndStandsAtItsEnds) {
   constexpr double kPeriod = 0.01;
   RecordedPath path(6, 200);

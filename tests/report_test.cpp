@@ -431,6 +431,25 @@ void expectServosLagAsTheirLoopSays(const Chapter4& chapter) {
     }
 }
 
+/// Numbers of one run that two sections have worked out, each in its own way.
+void expectSaidAlike(const Chapter4& chapter) {
+  const auto numbers = [&](const std::string& where) {
+    std::vector<std::string> out;
+    for (const auto& claim : chapter.summary["claims"])
+      if (claim["where"] == where) {
+        const std::string reached = claim["reached"];
+        const std::regex number("[0-9]+\\.[0-9]+");
+        for (std::sregex_iterator m(reached.begin(), reached.end(), number), end; m != end; ++m)
+          out.push_back(m->str());
+      }
+    return out;
+  };
+  const auto lag = numbers("4.2.1, figures 4.4 and 4.5"), error = numbers("4.2.1, figure 4.5");
+  ASSERT_GE(std::min(lag.size(), error.size()), 2u);
+  EXPECT_EQ(error[0], lag[0]);
+  EXPECT_EQ(error[1], lag[1]);
+}
+
 TEST(Chapter4, EveryClaimHasItsVerdict) {
   const fs::path folder = fs::temp_directory_path() / ("ves_chapter4_" + std::to_string(getpid()));
   fs::create_directories(folder);
@@ -485,6 +504,7 @@ TEST(Chapter4, EveryClaimHasItsVerdict) {
   EXPECT_EQ(runs, 8);
   expectSaidAsMeasured(chapter);
   expectServosLagAsTheirLoopSays(chapter);
+  expectSaidAlike(chapter);
   EXPECT_EQ(chapter.summary["divergence"]["ended"], "stopped");
 }
 #endif

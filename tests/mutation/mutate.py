@@ -130,18 +130,20 @@ KILLS = collections.Counter()  # mutants by the test that noticed them, so far
 OF_A_SUITE = 3  # tests of one suite, before those of others have been tried
 LIVE = "test_programs"  # starts the programs as processes
 FEWEST = 500  # tests; fewer are found where the test programs are called otherwise
-FAULTS = "Faults.Table.published"  # the one test of ctest that is no gtest
+# The tests of ctest that are no gtests, and what `ves` is asked in them.
+ASKED = {"Faults.Table.published": ["faults", "--lockstep"],
+         "Faults.Processes": ["faults", "F14", "F15", "F21"]}
 
 
 def command(binary, names):
-    if binary == FAULTS:
-        return [BUILD / "apps" / "ves", "faults", "--lockstep"]
+    if binary in ASKED:
+        return [BUILD / "apps" / "ves", *ASKED[binary]]
     return [BUILD / "tests" / binary, "--gtest_filter=" + ":".join(names)]
 
 
 def all_tests():
     """[binary, test] of everything in C++ that ctest would run."""
-    out = [(FAULTS, FAULTS)]
+    out = [(name, name) for name in ASKED]
     for binary in sorted((BUILD / "tests").glob("test_*")):
         if binary.name == "test_no_heap" or not os.access(binary, os.X_OK):
             continue
@@ -225,7 +227,7 @@ def attack(record, tests, before):
         binary, allowed = some[0]["binary"], 10.0 + 6.0 * sum(t["seconds"] for t in some)
         names = [t["name"] for t in some]
         killer = noticed(record, binary, names, allowed)
-        if killer and binary == LIVE:  # what waits for other processes can fail by itself
+        if killer and binary in (LIVE, "Faults.Processes"):  # what waits for other processes can fail by itself
             killer = noticed(record, binary, names, allowed)
         if killer:
             KILLS[killer] += 1
