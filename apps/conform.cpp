@@ -134,10 +134,11 @@ int conformCommand(int argc, char** argv) {
     for (const std::string& one : options.overrides)
       if (one.starts_with("program="))
         throw InputError("--set program: means nothing here, the motion is this command's own");
-    options.overrides.push_back(
-        "program=[{move: {}}, {move: {to: {x_m: 0.01, y_m: -0.008, z_m: 0.02, alpha_deg: 2, "
-        "beta_deg: -1.5, gamma_deg: 1}, duration_s: 2}}, {move: {to: {x_m: 0.01, y_m: -0.008, "
-        "z_m: 0.02, alpha_deg: 2, beta_deg: -1.5, gamma_deg: 1}, duration_s: 2}}, {move: {}}]");
+    // There every leg is some millimetres from where any other is told to be.
+    const std::string away =
+        "{move: {to: {x_m: 0.015, y_m: 0.015, z_m: 0.02, beta_deg: 3, gamma_deg: -2}, duration_s: "
+        "2}}";
+    options.overrides.push_back("program=[{move: {}}, " + away + ", " + away + ", {move: {}}]");
     const Experiment experiment = options.load();
     if (options.verbose) printWarnings(experiment, true);
     options.enterBus();

@@ -53,9 +53,10 @@ int refusedRealtime() {
   setrlimit(RLIMIT_MEMLOCK, &none);
   if (geteuid() == 0 && setuid(65534) != 0) return 77;
   const std::string said = claimRealtime(80, false);
-  const std::size_t fifo = said.find("SCHED_FIFO refused: "),
-                    memory = said.find("; locked memory refused: ");
-  if (fifo != 0 || memory == std::string::npos) return 1;
+  if (said.find("SCHED_FIFO refused: ") != 0) return 1;
+#ifndef VES_SANITIZE  // under whose sanitizers nobody locks memory, nor is refused it
+  if (said.find("; locked memory refused: ") == std::string::npos) return 1;
+#endif
   try {
     claimRealtime(80, true);
   } catch (const InputError& error) {

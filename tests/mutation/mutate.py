@@ -227,7 +227,8 @@ def attack(record, tests, before):
         binary, allowed = some[0]["binary"], 10.0 + 6.0 * sum(t["seconds"] for t in some)
         names = [t["name"] for t in some]
         killer = noticed(record, binary, names, allowed)
-        if killer and binary in (LIVE, "Faults.Processes"):  # what waits for other processes can fail by itself
+        # What waits for other processes can fail by itself.
+        if killer and binary in (LIVE, "Faults.Processes"):
             killer = noticed(record, binary, names, allowed)
         if killer:
             KILLS[killer] += 1
