@@ -32,7 +32,8 @@ SWINGING = FREE[:-1] + ["program=[{move: {}}, {calibration: {}}, {admittance: {d
 
 class Live(support.Page):
     def open(self, run):
-        support.errors(self.browser)  # those of the run before are told
+        self.browser.get("about:blank")  # the page of the run before asks for it once a second
+        support.errors(self.browser)
         self.browser.get(run.url)
         self.until("window.ves !== undefined && ves.count > 1")
 
