@@ -30,8 +30,8 @@ std::vector<Requirement> listen(const Experiment& experiment, const std::string&
   std::optional<SampleJudge> judge;
   const std::int64_t start = monotonicNow();
   bus.subscribe({channel::kSample}, [&](const std::string&, const void* data, std::uint32_t size) {
-    if (!judge) judge.emplace(setup, monotonicNow());
-    judge->take(data, size, monotonicNow());
+    if (!judge) judge.emplace(setup, bus.arrival());
+    judge->take(data, size, bus.arrival());  // how late we come to it is no fault of the machine
   });
   for (bool announced = false; !judge && !stop_requested && monotonicNow() - start < kFirstSample;
        bus.wait(100))
