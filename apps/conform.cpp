@@ -52,7 +52,7 @@ std::vector<Requirement> listen(const Experiment& experiment, const std::string&
 /// Arms, 20 mm up and tilted so that every leg goes a way of its own, rests there, home again,
 /// parks.
 std::vector<Requirement> move(const Experiment& experiment, const ProcessOptions& process) {
-  LegJudge legs;
+  LegJudge legs(experiment.controller.period);
   const RunResult result = runController(experiment, process, [&](const TickState& s) {
     legs.take(s);
     return stop_requested ? Order{Request::kStop, {}, {}} : Order();

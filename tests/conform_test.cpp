@@ -216,15 +216,16 @@ TEST(Conform, BytesThatAreNoSampleAreCounted) {
 
 /// Told from home away in two seconds and held there; row i of `as` answers leg i, late by `ticks`,
 /// and samples come every `every` ticks.
-std::string whichLeg(const std::array<int, 6>& as, int ticks, int every = 1) {
+std::string whichLeg(const std::array<int, 6>& as, int ticks, int every = 1,
+                     std::int64_t period = 10'000'000) {
   const Vec6 home = Vec6::Constant(1.4);
   Vec6 away;
   away << 0.012, 0.030, 0.027, 0.008, 0.016, 0.005;
   const auto told = [&](int tick) -> Vec6 {
-    return home + away * std::clamp(0.005 * tick, 0.0, 1.0);
+    return home + away * std::clamp(0.5e-9 * static_cast<double>(tick * period), 0.0, 1.0);
   };
-  LegJudge judge;
-  for (int tick = 0; tick < 400; ++tick) {
+  LegJudge judge(period);
+  for (int tick = 0; tick * period < 4'000'000'000; ++tick) {
     TickState s;
     s.command.engaged = true;
     s.sample_sequence = tick / every;
@@ -247,6 +248,9 @@ TEST(Conform, AMachineThatAnswersLateStillMovesTheLegsItIsTold) {
         << late;
   }
   EXPECT_EQ(whichLeg({0, 1, 2, 3, 4, 5}, 40, 3), "");
+  for (const std::int64_t period :
+       {1'000'000, 50'000'000, 1'000'000'000})  // the rates that there are
+    EXPECT_EQ(whichLeg({0, 1, 2, 3, 4, 5}, period < 10'000'000 ? 400 : 0, 1, period), "") << period;
   // Too few samples came while it rested: nothing is known.
   EXPECT_EQ(whichLeg({0, 1, 2, 3, 4, 5}, 40, 5), "never at rest away from home");
 }

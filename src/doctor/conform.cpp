@@ -167,13 +167,14 @@ std::vector<Requirement> SampleJudge::verdict(std::int64_t now) const {
 }
 
 void LegJudge::take(const TickState& state) {
-  constexpr int kSettled = 50;     // [-] ticks
-  constexpr double kAway = 0.001;  // [m] between the longest and the shortest leg
+  constexpr std::int64_t kSettling = 500'000'000;  // [ns]
+  constexpr double kAway = 0.001;                  // [m] between the longest and the shortest leg
   if (state.legs.L != told_) settled_ = 0;
   if (state.sample_sequence > sequence_) ++settled_;
   told_ = state.legs.L;
   sequence_ = state.sample_sequence;
-  if (!state.command.engaged || settled_ <= kSettled || told_.maxCoeff() - told_.minCoeff() < kAway)
+  if (!state.command.engaged || (settled_ - 1) * period_ < kSettling ||
+      told_.maxCoeff() - told_.minCoeff() < kAway)
     return;
   seen_ = true;
   for (int i = 0; i < kLegs; ++i)

@@ -62,14 +62,16 @@ class SampleJudge {
 /// it rests only: on the way a machine that answers late is nearer to a leg that goes less far.
 class LegJudge {
  public:
+  explicit LegJudge(std::int64_t period) : period_(period) {}  // [ns] of a tick
   void take(const TickState& state);
   Requirement verdict() const;
 
  private:
+  std::int64_t period_;
   Mat6 apart_ = Mat6::Zero();   // [m^2] row: a leg as measured; column: a leg as told
   Vec6 told_ = Vec6::Zero();    // [m]
   std::int64_t sequence_ = -1;  // of the last sample
-  int settled_ = 0;             // [-] ticks with a new sample since the legs' order changed
+  std::int64_t settled_ = 0;    // [-] ticks with a new sample since the legs' order changed
   bool seen_ = false;           // at rest away from home
 };
 
