@@ -314,6 +314,21 @@ TEST(Gate, LooksAtEachMotionWhateverElseThereIs) {
   EXPECT_NEAR(poses.back().q(0), 0.0, 1e-9);
 }
 
+TEST(Gate, LooksOnceAtAMotionThatIsMadeAgain) {
+  const auto count = [](int turns) {
+    std::string events;
+    for (int k = 0; k < turns; ++k)
+      events += fmt::format("{}{{at_s: {}, duration_s: 1.5, joint: joint_2, to_deg_or_m: {}}}",
+                            k ? ", " : "", 1 + 3 * k, k % 2 == 0 ? -60 : -90);
+    const Experiment e =
+        test::experiment("puma_on_table_4_1",
+                         {"program=[{admittance: {duration_s: 100}, robot: [" + events + "]}]"});
+    return programRobots(e.controller, e.plant.task).size();
+  };
+  EXPECT_EQ(count(1), 13u);  // twelve steps on one way
+  EXPECT_EQ(count(30), 13u);
+}
+
 // However long before it the robot has moved there.
 TEST(Gate, LooksAtThePoseInWhichAdmittanceControlBegins) {
   const Experiment e = test::experiment(

@@ -81,6 +81,17 @@ class ProgramTime {
   std::int64_t origin_ = 0;         // [ns] start of the segment
 };
 
+bool near(const RigidBody& a, const RigidBody& b) {
+  constexpr double kNear = 1e-9;  // [kg, kg m^2] and [m]: no loop differs by it
+  return std::abs(a.mass - b.mass) < kNear && (a.p_BoBcm_B - b.p_BoBcm_B).norm() < kNear &&
+         (a.I_Bcm_B - b.I_Bcm_B).norm() < kNear;
+}
+
+bool near(const ProgramRobot& a, const ProgramRobot& b) {
+  return (a.q - b.q).norm() < 1e-9 && near(a.body.robot_P, b.body.robot_P) &&
+         near(a.body.known_P, b.body.known_P) && near(a.in_hand, b.in_hand);
+}
+
 }  // namespace
 
 std::vector<ProgramRobot> programRobots(const ControllerConfig& controller, const RobotTask& task) {
@@ -91,11 +102,15 @@ std::vector<ProgramRobot> programRobots(const ControllerConfig& controller, cons
   };
   ProgramTime time(controller, task);
   std::vector<ProgramRobot> out = {time.look()};
+  const auto add =
+      [&](const ProgramRobot& robot) {  // a motion that is made again is looked at once
+        const auto known = [&](const ProgramRobot& one) { return near(one, robot); };
+        if (std::none_of(out.begin(), out.end(), known)) out.push_back(robot);
+      };
   for (int i = 0; i < program.size; ++i) {
-    const ProgramRobot begins = time.look();
-    if (felt(i) && begins != out.back()) out.push_back(begins);
+    if (felt(i)) add(time.look());
     time.pass(i, [&](const ProgramRobot& robot) {
-      if (felt(i) || felt(i + 1)) out.push_back(robot);  // a motion may outlast its segment
+      if (felt(i) || felt(i + 1)) add(robot);  // a motion may outlast its segment
     });
   }
   return out;

@@ -12,9 +12,9 @@
 namespace ves {
 namespace {
 
-constexpr std::int64_t kSecond = 1'000'000'000;      // [ns]
-constexpr std::int64_t kRepeat = kSecond / 5;        // [ns] without an answer
-constexpr int kStopTimes = 10, kVehicleTimes = 100;  // [-] the stability check takes its time
+constexpr std::int64_t kSecond = 1'000'000'000;       // [ns]
+constexpr std::int64_t kRepeat = kSecond / 5;         // [ns] without an answer
+constexpr int kStopTimes = 10, kVehicleTimes = 1500;  // [-] the stability check takes its time
 
 }  // namespace
 

@@ -131,6 +131,7 @@ window.ves = {
   look: view => stage.look(view),
   time: () => first.time(shown),
   end: () => first.time(first.count - 1),
+  pace: () => first.scalar(first.count - 1, 'pace'),
   charted: () => charts.charts.length ? charts.charts[0].rows.map(row => row[0]) : [],
   chart: k => charts.charts[k],
   window: () => charts.charts.map(c => c.chart.xAxisRange()),
