@@ -137,7 +137,8 @@ class Browser {
   Browser(const std::filesystem::path& page, const FilmOptions& options, double scale)
       : child_({inPath({"chromium", "chromium-browser", "google-chrome"}), "--headless=new",
                 "--remote-debugging-pipe", "--no-sandbox", "--use-angle=swiftshader",
-                "--enable-unsafe-swiftshader", "--disable-dev-shm-usage", "--hide-scrollbars",
+                "--enable-unsafe-swiftshader", "--disable-gpu-rasterization",
+                "--disable-accelerated-2d-canvas", "--disable-dev-shm-usage", "--hide-scrollbars",
                 "--user-data-dir=" + (folder_.path() / "profile").string(), "about:blank"},
                3, 4) {
     const Answer target = call("Target.createTarget", {{"url", "about:blank"}});

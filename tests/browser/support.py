@@ -106,7 +106,8 @@ def browser(profile):
     flags = Options()
     flags.binary_location = "/usr/bin/chromium"
     for flag in ["--headless=new", "--no-sandbox", "--use-angle=swiftshader",
-                 "--enable-unsafe-swiftshader", "--disable-dev-shm-usage",
+                 "--enable-unsafe-swiftshader", "--disable-gpu-rasterization",
+                 "--disable-accelerated-2d-canvas", "--disable-dev-shm-usage",
                  "--window-size=1280,720", f"--user-data-dir={profile}"]:
         flags.add_argument(flag)
     flags.set_capability("goog:loggingPrefs", {"browser": "ALL"})
