@@ -82,9 +82,9 @@ class ProgramTime {
 };
 
 bool near(const RigidBody& a, const RigidBody& b) {
-  constexpr double kNear = 1e-9;  // [kg, kg m^2] and [m]: no loop differs by it
-  return std::abs(a.mass - b.mass) < kNear && (a.p_BoBcm_B - b.p_BoBcm_B).norm() < kNear &&
-         (a.I_Bcm_B - b.I_Bcm_B).norm() < kNear;
+  constexpr double kSame = 1e-9;  // [kg, kg m^2] and [m]: no loop differs by it
+  return std::abs(a.mass - b.mass) < kSame && (a.p_BoBcm_B - b.p_BoBcm_B).norm() < kSame &&
+         (a.I_Bcm_B - b.I_Bcm_B).norm() < kSame;
 }
 
 bool near(const ProgramRobot& a, const ProgramRobot& b) {
