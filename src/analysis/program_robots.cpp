@@ -102,11 +102,11 @@ std::vector<ProgramRobot> programRobots(const ControllerConfig& controller, cons
   };
   ProgramTime time(controller, task);
   std::vector<ProgramRobot> out = {time.look()};
-  const auto add =
-      [&](const ProgramRobot& robot) {  // a motion that is made again is looked at once
-        const auto known = [&](const ProgramRobot& one) { return near(one, robot); };
-        if (std::none_of(out.begin(), out.end(), known)) out.push_back(robot);
-      };
+  // A motion that is made again is looked at once.
+  const auto add = [&](const ProgramRobot& robot) {
+    const auto known = [&](const ProgramRobot& one) { return near(one, robot); };
+    if (std::none_of(out.begin(), out.end(), known)) out.push_back(robot);
+  };
   for (int i = 0; i < program.size; ++i) {
     if (felt(i)) add(time.look());
     time.pass(i, [&](const ProgramRobot& robot) {

@@ -135,6 +135,8 @@ class Child {
 class Browser {
  public:
   Browser(const std::filesystem::path& page, const FilmOptions& options, double scale)
+      // Without a graphics card WebGL is emulated, and charts rastered by that emulator hold the
+      // page up.
       : child_({inPath({"chromium", "chromium-browser", "google-chrome"}), "--headless=new",
                 "--remote-debugging-pipe", "--no-sandbox", "--use-angle=swiftshader",
                 "--enable-unsafe-swiftshader", "--disable-gpu-rasterization",

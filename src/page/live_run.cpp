@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000;       // [ns]
 constexpr std::int64_t kRepeat = kSecond / 5;         // [ns] without an answer
-constexpr int kStopTimes = 10, kVehicleTimes = 1500;  // [-] the stability check takes its time
+constexpr int kStopTimes = 10, kVehicleTimes = 1500;  // [-] the stability check may take minutes
 
 }  // namespace
 

@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kRepeat = 200;                          // [ms] an order without an answer
 constexpr int kRepeats = 10;                          // [-]
-constexpr int kRepeatsOfVehicle = 1500;               // [-] the stability check takes its time
+constexpr int kRepeatsOfVehicle = 1500;               // [-] the stability check may take minutes
 constexpr std::int64_t kFirstState = 15'000'000'000;  // [ns]
 
 }  // namespace

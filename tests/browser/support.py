@@ -23,7 +23,7 @@ from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.support.ui import WebDriverWait
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-PATIENCE = 180  # [s] for what comes in one on a machine with nothing else to do
+PATIENCE = 180  # [s] to wait; what is waited for takes seconds on a machine that does nothing else
 options = argparse.Namespace()
 
 
@@ -78,7 +78,7 @@ class Run:
         self.url = re.search(r"http://\S+", self.process.stdout.readline()).group(0)
 
     def end(self):
-        """Of a test that failed: nothing of it runs beside the next."""
+        """Ends what a failed test left running, so that it does not run beside the next."""
         self.process.kill()
         self.process.communicate()
 
@@ -115,9 +115,9 @@ def browser(profile):
 
 
 def errors(chromium):
-    """What went wrong in the page. That it asks again for a run that is over is none."""
-    return [e for e in chromium.get_log("browser")
-            if e["level"] == "SEVERE" and "net::ERR_CONNECTION_REFUSED" not in e["message"]]
+    """What went wrong in the page. That its web socket asks again for a run that is over is no error."""
+    asked_again = re.compile(r"WebSocket connection to .* failed: .*net::ERR_CONNECTION_REFUSED")
+    return [e for e in chromium.get_log("browser") if e["level"] == "SEVERE" and not asked_again.search(e["message"])]
 
 
 def turn(rpy):
