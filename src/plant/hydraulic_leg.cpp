@@ -87,7 +87,8 @@ bool fit(HydraulicLegModel& leg, const ActuatorModel& gains, double current, dou
 }
 
 HydraulicLeg::HydraulicLeg(const HydraulicLegModel& model, double length, double load) noexcept
-    : model_(model), metered_(model.valve.circuit == Circuit::kThreeWay ? 1 : 2), y_(length) {
+    : metered_(model.valve.circuit == Circuit::kThreeWay ? 1 : 2), y_(length) {
+  use(model);
   const CylinderModel& c = model_.cylinder;
   const double p_S = model_.oil.supply, beta = model_.oil.bulk_modulus;
   if (c.play > 0.0) y_ += 0.5 * c.play * std::clamp(load / c.seating, -1.0, 1.0);
@@ -107,8 +108,15 @@ HydraulicLeg::HydraulicLeg(const HydraulicLegModel& model, double length, double
   pressed_ = loadPressure();
 }
 
-void HydraulicLeg::become(const HydraulicLegModel& model) noexcept {
+void HydraulicLeg::use(const HydraulicLegModel& model) noexcept {
   model_ = model;
+  swelling_S_ = std::exp(model_.oil.supply / model_.oil.bulk_modulus);
+  h_S_ = enthalpy(model_.oil.supply, model_.oil.bulk_modulus);
+  friction_ = steadyFriction(model_.seals, v_);
+}
+
+void HydraulicLeg::become(const HydraulicLegModel& model) noexcept {
+  use(model);
   if (metered_ == 1) p_[1] = model_.oil.supply;
   for (std::size_t k = 0; k < 2; ++k)
     oil_[k] = volume(k, y_) * std::exp(p_[k] / model_.oil.bulk_modulus);
@@ -171,11 +179,12 @@ HydraulicLeg::Moved HydraulicLeg::moved(double dy, double dt,
   const double beta = model_.oil.bulk_modulus;
   const std::array<double, 2> area = {model_.cylinder.bore, -model_.cylinder.rod_side};
   Moved out;
+  out.dy = dy;
   for (std::size_t k = 0; k < 2; ++k) {
     const double V = volume(k, y_), dV = area[k] * dy;
     if (k == 1 && metered_ == 1) {  // the rod's side is open to the supply
       out.p[k] = model_.oil.supply;
-      out.dN[k] = dV * std::exp(out.p[k] / beta);
+      out.dN[k] = dV * swelling_S_;
       continue;
     }
     const double rate = oil_[k] > V ? flow[k].in_rate - flow[k].out_rate : 0.0;
@@ -185,40 +194,56 @@ HydraulicLeg::Moved HydraulicLeg::moved(double dy, double dt,
     out.p[k] = pressureOf(oil_[k] + out.dN[k], V + dV, beta);
   }
   // The bristles, exactly while the speed stays.
+  const SealModel& s = model_.seals;
   out.z = z_;
-  if (const SealModel& s = model_.seals; s.bristle > 0.0 && dy != 0.0) {
-    const double end = std::copysign(steadyFriction(s, dy / dt) / s.bristle, dy);
+  if (s.bristle > 0.0) out.friction = steadyFriction(s, dy / dt);
+  if (s.bristle > 0.0 && dy != 0.0) {
+    const double end = std::copysign(out.friction / s.bristle, dy);
     out.z = end + (z_ - end) * std::exp(-std::abs(dy / end));
   }
   return out;
 }
 
-/// The way of a piston whose joints have play: y = L + s f, with the play as the spring s until
-/// they are seated. By bisection and regula falsi (Illinois): the seats are kinks.
-double HydraulicLeg::wayThroughPlay(double length, double dt,
-                                    const std::array<Flow, 2>& flow) const noexcept {
+/// With a piston whose joints have play: y = L + s f, with the play as the spring s until they are
+/// seated, which they mostly are and stay. By bisection and regula falsi (Illinois): the seats are
+/// kinks.
+HydraulicLeg::Moved HydraulicLeg::movedThroughPlay(double length, double dt,
+                                                   const std::array<Flow, 2>& flow) const noexcept {
   constexpr double kClose = 1e-13;  // [m]
   const double seat = model_.cylinder.seating, s = 0.5 * model_.cylinder.play / seat;
-  const auto miss = [&](double dy) {
-    const Moved m = moved(dy, dt, flow);
-    return y_ + dy - length - s * std::clamp(jointForce(m.p, m.z), -seat, seat);
+  struct End {
+    Moved moved;
+    double off;  // [m] at most 0 at the lower end, at least 0 at the upper one
   };
-  double lo = length - s * seat - y_, hi = length + s * seat - y_;
-  double below = miss(lo), above = miss(hi);  // at most 0, at least 0
-  for (int n = 0; n < 60 && hi - lo > kClose && below < 0.0 && above > 0.0; ++n) {
-    const double at = lo + (hi - lo) * below / (below - above), off = miss(at);
-    if (off < 0.0) {
-      lo = at;
-      below = off;
-      above *= 0.5;
-    } else {
-      hi = at;
-      above = off;
-      below *= 0.5;
-    }
-    if (std::abs(off) < kClose) return at;
+  const auto at = [&](double dy) {
+    const Moved m = moved(dy, dt, flow);
+    return End{m, y_ + dy - length - s * std::clamp(jointForce(m.p, m.z), -seat, seat)};
+  };
+  const double lowest = length - s * seat - y_, highest = length + s * seat - y_;
+  const bool pressed = jointForce(p_, z_) > 0.0;
+  End hi, lo;
+  if (pressed) {
+    hi = at(highest);
+    if (hi.off <= kClose) return hi.moved;
+    lo = at(lowest);
+  } else {
+    lo = at(lowest);
+    if (lo.off >= 0.0) return lo.moved;
+    hi = at(highest);
   }
-  return above <= kClose ? hi : lo;
+  for (int n = 0; n < 60 && hi.moved.dy - lo.moved.dy > kClose && lo.off < 0.0 && hi.off > 0.0;
+       ++n) {
+    const End next = at(lo.moved.dy + (hi.moved.dy - lo.moved.dy) * lo.off / (lo.off - hi.off));
+    if (std::abs(next.off) < kClose) return next.moved;
+    if (next.off < 0.0) {
+      lo = next;
+      hi.off *= 0.5;
+    } else {
+      hi = next;
+      lo.off *= 0.5;
+    }
+  }
+  return hi.off <= kClose ? hi.moved : lo.moved;
 }
 
 void HydraulicLeg::drift(double current, double length, double dt,
@@ -233,25 +258,26 @@ void HydraulicLeg::drift(double current, double length, double dt,
     flow[1] = through(-x, p_[1]);
     flow[1].past = -past;
   }
-  const double dy = model_.cylinder.play > 0.0 ? wayThroughPlay(length, dt, flow) : length - y_;
-  const Moved m = moved(dy, dt, flow);
+  const Moved m = model_.cylinder.play > 0.0 ? movedThroughPlay(length, dt, flow)
+                                             : moved(length - y_, dt, flow);
 
-  const double beta = model_.oil.bulk_modulus, h_S = enthalpy(model_.oil.supply, beta);
+  const double beta = model_.oil.bulk_modulus;
   std::array<double, 2> h;
   for (std::size_t k = 0; k < 2; ++k) {
-    h[k] = enthalpy(0.5 * (p_[k] + m.p[k]), beta);
+    h[k] = k < static_cast<std::size_t>(metered_) ? enthalpy(0.5 * (p_[k] + m.p[k]), beta) : h_S_;
     const double in = dt * (flow[k].in + flow[k].in_rate * m.change[k]),
                  out = dt * (flow[k].out + flow[k].out_rate * m.change[k]);
-    losses_.supplied += h_S * in;
-    losses_.valve += in * (h_S - h[k]) + out * h[k];
+    losses_.supplied += h_S_ * in;
+    losses_.valve += in * (h_S_ - h[k]) + out * h[k];
   }
-  if (metered_ == 1) losses_.supplied += h_S * (m.dN[1] + dt * past);
+  if (metered_ == 1) losses_.supplied += h_S_ * (m.dN[1] + dt * past);
   losses_.leak += dt * (past * (h[1] - h[0]) + lost * h[0]);
   const double bent = m.z - z_;
-  losses_.seals += 0.5 * model_.seals.bristle * (m.z + z_) * (dy - bent);
+  losses_.seals += 0.5 * model_.seals.bristle * (m.z + z_) * (m.dy - bent);
 
-  v_ = dy / dt;
-  y_ += dy;
+  v_ = m.dy / dt;
+  friction_ = m.friction;
+  y_ += m.dy;
   z_ = m.z;
   p_ = m.p;
   for (std::size_t k = 0; k < 2; ++k) oil_[k] += m.dN[k];
@@ -263,7 +289,7 @@ double HydraulicLeg::damping() const noexcept {
   const SealModel& s = model_.seals;
   double D = s.viscous;
   if (s.bristle > 0.0) {
-    const double part = s.bristle * z_ * std::copysign(1.0, v_) / steadyFriction(s, v_);
+    const double part = s.bristle * z_ * std::copysign(1.0, v_) / friction_;
     D += s.bristle_damping * std::max(0.0, 1.0 - part);
   }
   return D + (stopForce() != 0.0 ? model_.cylinder.stop_damping : 0.0);

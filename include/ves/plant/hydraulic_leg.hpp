@@ -135,19 +135,23 @@ class HydraulicLeg {
     double past = 0.0;                     // [m^3/s] in past the piston
   };
   struct Moved {
+    double dy = 0.0;                            // [m] of the piston
     std::array<double, 2> dN{}, change{}, p{};  // [m^3, Pa, Pa] of the chambers; implicit change
-    double z = 0.0;                             // [m]
+    double z = 0.0, friction = 0.0;             // [m], [N] steadyFriction() at that speed
   };
+  void use(const HydraulicLegModel& model) noexcept;
   double openSpool(double current, double dt, const SecondOrderHold& spool) noexcept;
   double loadPressure() const noexcept;
   Flow through(double towards, double p) const noexcept;
   Moved moved(double dy, double dt, const std::array<Flow, 2>& flow) const noexcept;
-  double wayThroughPlay(double length, double dt, const std::array<Flow, 2>& flow) const noexcept;
+  Moved movedThroughPlay(double length, double dt, const std::array<Flow, 2>& flow) const noexcept;
   double jointForce(const std::array<double, 2>& p, double z) const noexcept;
   double stopForce() const noexcept;
   double volume(std::size_t chamber, double y) const noexcept;
 
   HydraulicLegModel model_;
+  double swelling_S_ = 1.0;      // [-] N/V of a chamber at supply pressure,
+  double h_S_ = 0.0;             // [Pa] and enthalpy that a m^3 of N carries there
   int metered_;                  // [-] chambers that the valve meters
   double y_;                     // [m] of the cylinder
   Eigen::Vector2d eta_;          // [A, A/s] spool
@@ -155,7 +159,8 @@ class HydraulicLeg {
   std::array<double, 2> p_{};    // [Pa]
   double pressed_;               // [Pa] loadPressure() behind the feedback's low-pass
   double z_ = 0.0;               // [m] of the seals' bristles
-  double v_ = 0.0;               // [m/s] of the piston, last
+  double v_ = 0.0;               // [m/s] of the piston, last,
+  double friction_ = 0.0;        // [N] and what the seals take when that is steady
   HydraulicLosses losses_;
 };
 
