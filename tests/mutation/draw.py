@@ -192,8 +192,9 @@ class Finder:
         elif kind == K.CONDITIONAL_OPERATOR:
             parts = list(cursor.get_children())
             if len(parts) == 3:
-                (a0, b0), (a1, b1), (a2, b2) = map(span, parts)
-                self.add(a0, b0, "choice swapped", "(::ves_m(@) != ({}))", (a0, b0))
+                (a0, b0), (a1, _), _ = map(span, parts)
+                if "?" in self.source(b0, a1):  # and not in a macro
+                    self.add(a0, b0, "choice swapped", "(::ves_m(@) != ({}))", (a0, b0))
         elif kind == K.CALL_EXPR and cursor.spelling == "transpose" and text.endswith(".transpose()"):
             inner = a, b - len(".transpose()")
             if is_rotation(next(cursor.get_children())) or is_rotation(cursor):
