@@ -8,7 +8,7 @@
 #include "support/ether.hpp"
 #include "support/refusal.hpp"
 #include "support/rig.hpp"
-#include "ves/bus/bus.hpp"
+#include "ves/bus/asking.hpp"
 #include "ves/bus/channels.hpp"
 #include "ves/bus/fields.hpp"
 #include "ves/config/document.hpp"
@@ -259,6 +259,75 @@ TEST(Bus, WhatAHandlerThrowsComesUpInTheLoopThatReads) {
   EXPECT_EQ(heard, 3);  // one that throws keeps nothing from the others
   EXPECT_THROW(bus.here.rethrow(), InputError);
   EXPECT_NO_THROW(bus.here.rethrow());
+}
+
+/// A client in time steps of 10 ms, and what the controller hears of it.
+struct Client {
+  explicit Client(Request request) : asking({request, {}, {}, 9}, {5, 1}, 3) {
+    bus.here.subscribe({channel::kOperator},
+                       [this](const std::string&, const void* data, std::uint32_t size) {
+                         const auto m = decode<operator_t>(data, size);
+                         ASSERT_TRUE(m);
+                         EXPECT_EQ(m->header.source, 5);
+                         EXPECT_EQ(m->header.sequence, 3);
+                         EXPECT_EQ(m->controller, 9);
+                         ++heard;
+                       });
+  }
+  void pass(double seconds) {
+    for (int k = 0; k < std::lround(100.0 * seconds); ++k) {
+      asking.say(bus.there, now);
+      now += 10'000'000;
+      bus.here.drain();
+    }
+  }
+  void answer(std::int64_t controller, std::int64_t to, std::int64_t sequence, Refusal refusal) {
+    state_t state{};
+    state.header.source = controller;
+    state.order_source = to;
+    state.order_sequence = sequence;
+    state.refusal = static_cast<decltype(state.refusal)>(refusal);
+    asking.hear(state);
+  }
+
+  InMemory bus;
+  Asking asking;
+  std::int64_t now = 7'000'000'000;  // [ns]
+  int heard = 0;
+};
+
+TEST(Asking, SaysAnOrderFiveTimesASecondUntilItIsAnswered) {
+  Client client(Request::kArm);
+  client.pass(1.0);
+  EXPECT_EQ(client.heard, 5);
+  client.answer(9, 6, 3, Refusal::kNone);      // to another
+  client.answer(9, 5, 2, Refusal::kNone);      // to an earlier one
+  client.answer(8, 5, 3, Refusal::kNone);      // by another
+  client.answer(9, 5, 3, Refusal::kChecking);  // no answer yet
+  EXPECT_TRUE(client.asking.underWay());
+  EXPECT_FALSE(client.asking.answer());
+  client.answer(9, 5, 3, Refusal::kBusy);
+  client.answer(9, 6, 0, Refusal::kNone);  // what comes after it takes nothing of it
+  EXPECT_FALSE(client.asking.underWay());
+  EXPECT_EQ(client.asking.answer(), Refusal::kBusy);
+  client.pass(1.0);
+  EXPECT_EQ(client.heard, 5);
+}
+
+TEST(Asking, GivesUpAfterTwoSecondsAndOfAVehicleAfterFiveMinutes) {
+  for (const auto& [request, seconds] :
+       {std::pair{Request::kTare, 2.0}, std::pair{Request::kVehicle, 300.0}}) {
+    Client client(request);
+    client.pass(seconds);
+    EXPECT_TRUE(client.asking.underWay());
+    EXPECT_EQ(client.heard, std::lround(5.0 * seconds));
+    client.pass(1.0);
+    EXPECT_FALSE(client.asking.underWay());
+    EXPECT_FALSE(client.asking.answer());
+    EXPECT_EQ(client.heard, std::lround(5.0 * seconds));
+    client.answer(9, 5, 3, Refusal::kNone);  // too late: it was said that none came
+    EXPECT_FALSE(client.asking.answer());
+  }
 }
 
 TEST(Bus, WhoOnlySpeaksWaitsForNothing) {

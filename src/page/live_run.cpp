@@ -12,9 +12,7 @@
 namespace ves {
 namespace {
 
-constexpr std::int64_t kSecond = 1'000'000'000;       // [ns]
-constexpr std::int64_t kRepeat = kSecond / 5;         // [ns] without an answer
-constexpr int kStopTimes = 10, kVehicleTimes = 1500;  // [-] the stability check may take minutes
+constexpr std::int64_t kSecond = 1'000'000'000;  // [ns]
 
 }  // namespace
 
@@ -85,8 +83,8 @@ void LiveRun::takeState(const state_t& state) {
   heard_ = monotonicNow();
   describe();
   measureRate(state);
-  hearAnswer(stop_, state);
-  hearAnswer(vehicle_, state);
+  for (std::optional<Asking>* asked : {&stop_, &vehicle_})
+    if (*asked) (*asked)->hear(state);
   const auto row = rows_.add(state);
   if (!row || !scene_) return;
   row_ = *row;
@@ -158,30 +156,13 @@ void LiveRun::remind() {
     query.header = header(self_, sent_++, now);
     bus_.publish(channel::kQuery, query);
   }
-  repeat(stop_);
-  repeat(vehicle_);
+  for (std::optional<Asking>* asked : {&stop_, &vehicle_})
+    if (*asked) (*asked)->say(bus_, now);
 }
 
-void LiveRun::ask(std::optional<Asked>& asked, const Order& order, int times) {
-  asked = Asked{order, sent_++, 0, times};
-  repeat(asked);
-}
-
-void LiveRun::repeat(std::optional<Asked>& asked) {
-  const std::int64_t now = monotonicNow();
-  if (!asked || !asked->underWay() || now - asked->sent <= kRepeat) return;
-  asked->sent = now;
-  --asked->times;
-  Order order = asked->order;
+void LiveRun::ask(std::optional<Asking>& asked, Order order) {
   order.controller = controller_.source;
-  bus_.publish(channel::kOperator, toMessage(order, header(self_, asked->sequence, now)));
-}
-
-void LiveRun::hearAnswer(std::optional<Asked>& asked, const state_t& state) const {
-  const auto refusal = static_cast<Refusal>(state.refusal);
-  if (asked && state.order_source == self_.source && state.order_sequence == asked->sequence &&
-      refusal != Refusal::kChecking)
-    asked->answer = refusal;
+  asked.emplace(order, self_, sent_++).say(bus_, monotonicNow());
 }
 
 void LiveRun::take(const PageMessage& message) {
@@ -202,11 +183,11 @@ void LiveRun::take(const PageMessage& message) {
   } else if (vehicle) {
     Order order{Request::kVehicle, {}, {}};
     order.vehicle = *vehicle;
-    ask(vehicle_, order, kVehicleTimes);  // the newest counts
+    ask(vehicle_, order);  // the newest counts
   } else if (pace) {
     bus_.publish(channel::kPace, pace_t{header(self_, sent_++, now), machine_, pace->rate});
   } else if (!stop_ || !stop_->underWay()) {
-    ask(stop_, Order{Request::kStop, {}, {}}, kStopTimes);
+    ask(stop_, Order{Request::kStop, {}, {}});
   }
 }
 
@@ -215,10 +196,10 @@ void LiveRun::keepPicture() {
   const std::optional<Vec6> base = base_->at(row_->state);
   Picture one{newest_, row_->state.header.time_ns, rate_, scene_->picture(*row_, base)};
   // 0: nothing asked, 1: not answered yet, 2: answered, and how, 3: no answer came
-  const auto tell = [&](const std::optional<Asked>& asked) {
-    one.numbers.push_back(!asked ? 0.0f : asked->answer ? 2.0f : asked->underWay() ? 1.0f : 3.0f);
+  const auto tell = [&](const std::optional<Asking>& asked) {
+    one.numbers.push_back(!asked ? 0.0f : asked->answer() ? 2.0f : asked->underWay() ? 1.0f : 3.0f);
     one.numbers.push_back(
-        asked && asked->answer ? static_cast<float>(static_cast<int>(*asked->answer)) : NAN);
+        asked && asked->answer() ? static_cast<float>(static_cast<int>(*asked->answer())) : NAN);
   };
   tell(stop_);
   tell(vehicle_);

@@ -11,9 +11,6 @@
 namespace ves {
 namespace {
 
-constexpr int kRepeat = 200;                          // [ms] an order without an answer
-constexpr int kRepeats = 10;                          // [-]
-constexpr int kRepeatsOfVehicle = 1500;               // [-] the stability check may take minutes
 constexpr std::int64_t kFirstState = 15'000'000'000;  // [ns]
 
 }  // namespace
@@ -75,6 +72,7 @@ void Session::receive(const std::string& channel, const void* data, std::uint32_
   if (state_ && state->header.source != state_->header.source) return;
   state_ = state;
   ++heard_;
+  if (asking_) asking_->hear(*state);
   result_.ticks = state->count + 1;
   result_.simulated =
       static_cast<double>((state->header.sequence + 1) * experiment_.controller.period) *
@@ -103,24 +101,16 @@ bool Session::listen(int milliseconds, int descriptor) {
 
 std::optional<Refusal> Session::order(const Order& order, int descriptor) {
   const std::int64_t until = monotonicNow() + kFirstState;
-  while (!state_ && running() && monotonicNow() < until) listen(kRepeat);
+  while (!state_ && running() && monotonicNow() < until) listen(200);
   if (!state_) return {};
-  const std::int64_t sequence = orders_++;
   Order addressed = order;
   addressed.controller = state_->header.source;
-  const int repeats = order.request == Request::kVehicle ? kRepeatsOfVehicle : kRepeats;
-  for (int i = 0; i < repeats && running(); ++i) {
-    bus_.publish(channel::kOperator, toMessage(addressed, header(self_, sequence, monotonicNow())));
-    const std::int64_t repeat = monotonicNow() + kRepeat * 1'000'000LL;
-    while (monotonicNow() < repeat && running()) {
-      if (listen(10, descriptor)) return Refusal::kChecking;
-      const auto refusal = static_cast<Refusal>(state_->refusal);
-      if (state_->order_source == self_.source && state_->order_sequence == sequence &&
-          refusal != Refusal::kChecking)
-        return refusal;
-    }
+  asking_.emplace(addressed, self_, orders_++);
+  while (asking_->underWay() && running()) {
+    asking_->say(bus_, monotonicNow());
+    if (listen(10, descriptor)) return Refusal::kChecking;
   }
-  return {};
+  return asking_->answer();
 }
 
 void Session::orderRobot(const RobotOrder& order) {

@@ -43,8 +43,6 @@ struct ProgramRobot {
   JointVector q;
   CarriedRobot body;  // with what it has in hand; what of that the controller has been told
   RigidBody in_hand;  // what may be there that nobody tells, and may be learnt, in P
-
-  bool operator==(const ProgramRobot&) const = default;
 };
 
 /// The robot in admittance control, its masses as the controller believes them: where the program

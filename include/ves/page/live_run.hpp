@@ -10,7 +10,7 @@
 #include <optional>
 #include <string>
 
-#include "ves/bus/bus.hpp"
+#include "ves/bus/asking.hpp"
 #include "ves/evaluation/let_go.hpp"
 #include "ves/page/curves.hpp"
 #include "ves/page/scene.hpp"
@@ -32,9 +32,9 @@ class LiveRun : public LiveSource {
   const std::string& scene() const override { return scene_text_; }
   std::int64_t newest() const override { return newest_; }
   /// Three doubles {number, header.time_ns of the state, real-time factor} of the last one; then of
-  /// each, the oldest first, the floats of Scene::picture, those of Asked for a stop and a vehicle,
-  /// the pace of the machine, and those of Curves; little-endian.
-  /// One of every state that was heard: who draws seldom misses no sample.
+  /// each, the oldest first, the floats of Scene::picture, those of what was asked (a stop, a
+  /// vehicle), the pace of the machine, and those of Curves; little-endian. One of every state that
+  /// was heard: who draws seldom misses no sample.
   std::string pictures(std::int64_t after, std::int64_t& last) const override;
   void take(const PageMessage& message) override;
 
@@ -82,19 +82,8 @@ class LiveRun : public LiveSource {
   std::deque<Instant> instants_;  // of the last second
   double rate_ = NAN;             // [-] real-time factor
 
-  /// An order that is repeated until it is answered.
-  struct Asked {
-    Order order;
-    std::int64_t sequence, sent;  // [-], [ns]
-    int times;                    // [-] to send it still
-    std::optional<Refusal> answer = {};
-
-    bool underWay() const { return !answer && times > 0; }
-  };
-  void ask(std::optional<Asked>& asked, const Order& order, int times);
-  void repeat(std::optional<Asked>& asked);
-  void hearAnswer(std::optional<Asked>& asked, const state_t& state) const;
-  std::optional<Asked> stop_, vehicle_;
+  void ask(std::optional<Asking>& asked, Order order);
+  std::optional<Asking> stop_, vehicle_;
   double pace_ = NAN;  // [-] as the machine says; NaN: it has none
 };
 

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 
+#include "ves/bus/asking.hpp"
 #include "ves/run/process.hpp"
 #include "ves/run/run.hpp"
 
@@ -69,9 +70,10 @@ class Session {
   std::unique_ptr<Process> plant_, controller_;
   bool interrupted_ = false;
   std::optional<state_t> state_;
-  std::int64_t heard_ = 0;    // [-] states
-  std::int64_t orders_ = 0;   // [-] given
-  std::int64_t machine_ = 0;  // header.source of its samples; 0: none yet
+  std::int64_t heard_ = 0;        // [-] states
+  std::int64_t orders_ = 0;       // [-] given
+  std::optional<Asking> asking_;  // the last of those to the controller
+  std::int64_t machine_ = 0;      // header.source of its samples; 0: none yet
   RobotOrderCounts robot_orders_;
   RunResult result_;
   OnState on_state_;
