@@ -343,10 +343,14 @@ TEST_F(ClosedLoop, TheSetupIsAllThatADriverNeeds) {
   EXPECT_EQ(setup.period_ns, 10'000'000);
   EXPECT_EQ(setup.lockstep, 1);
   EXPECT_EQ(setup.joints, 6);
+  EXPECT_EQ(setup.wrench_window_ns, 0);  // one reading a sample
+  const Experiment mean = experiment("puma_on_table_4_1", {"sensor.readings_per_tick=4"});
+  EXPECT_EQ(toMessage(setupOf(mean, true), {}).wrench_window_ns, 10'000'000);
   const Eigen::Map<const Eigen::Matrix<double, 6, 6, Eigen::RowMajor>> per_count(
       setup.wrench_per_count);
   Vec6 bias = Vec6::Zero();  // a new one counts from the next tick
   for (const Row& row : series.rows) {
+    EXPECT_EQ(row.sample.answers, row.state.header.sequence - 1);
     Vec6 adc;
     for (int i = 0; i < 6; ++i) {
       EXPECT_NEAR(setup.leg_offset[i] + setup.leg_scale[i] * row.sample.legs[i],

@@ -1178,6 +1178,18 @@ TEST(SensorTiming, FindsALaterSensorAnEarlierOneAndAHeavierRobot) {  // with the
       }
 }
 
+TEST(SensorTiming, ItsDelayIsTheSameHoweverHeavyTheRobotIs) {
+  for (const double mass : {0.75, 1.0, 1.3}) {
+    Experiment e =
+        experiment("servo_identification", kPublished,
+                   {"sensor.noise=false", "plant_mismatch={mass: " + std::to_string(mass) + "}"});
+    const double w = e.controller.servo.sensor_cutoff, due = 0.04 * M_SQRT2 / w;
+    e.plant.sensor.cutoff = w / 1.04;
+    const SensorEstimate found = identifySensor(e.controller, Recorded(e).shake);
+    EXPECT_NEAR(found.delay, due, 0.12 * due) << mass;
+  }
+}
+
 // They are of blocks of one run, and hold what is the same in every run, too.
 TEST(SensorTiming, ItsDeviationsAreAboutWhatItScattersBy) {
   constexpr int kSeeds = 10;

@@ -600,6 +600,23 @@ TEST(Thrusters, ADeadBandHasItsLimitCycle) {
   }
 }
 
+TEST(Thrusters, APulseBeginsBeyondTheBandAndLastsAsLongAsItIs) {
+  Propulsion jets;
+  jets.hold.dead_band = 0.02;
+  jets.hold.pulse = 0.025;
+  jets.hold.torque_P = {3.0, 4.0, 5.0};
+  const Vec3 beyond(0.03, 0.0, -0.03);
+  EXPECT_TRUE(
+      pulsesOf(jets.hold, {}, beyond, Vec3(-1e-3, 0.0, 1e-3)).left.isZero(0.0));  // it returns
+  Pulses pulses = pulsesOf(jets.hold, {}, beyond, Vec3::Zero());                  // it stands there
+  EXPECT_EQ(pulses.left, Vec3(0.025, 0.0, 0.025));
+  for (const double share : {1.0, 1.0, 0.5, 0.0}) {  // of a tick
+    const Vec3 n = firings(jets, pulses, {}, 0.0, 0.01).mean.n;
+    EXPECT_LT((n - share * Vec3(-3.0, 0.0, 5.0)).norm(), 1e-9) << share;
+    pulses = spent(pulses, 0.01);
+  }
+}
+
 TEST(ReactionWheels, TurnABodyThatTumbles) {
   // About its axis of symmetry a body keeps momentum and wheel's together, here none, so that the
   // axis goes round the rest as if there were no wheel: R = Rx(w t) Rz(what the wheel has turned).

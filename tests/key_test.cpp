@@ -46,6 +46,7 @@ TEST(Key, FilesThatAreNoKeyOrForAllToReadAreRefused) {
   };
   EXPECT_EQ(refused(KeyFile()), "");
   EXPECT_EQ(refused(KeyFile(std::string(64, 'A') + "\n")), "");
+  EXPECT_EQ(refused(KeyFile(std::string(64, '0') + "\r\n")), "");  // from another system's editor
   EXPECT_NE(refused(KeyFile(std::string(64, 'a'), 0640)).find("mode 0640, want 0600"),
             std::string::npos);
   EXPECT_NE(refused(KeyFile(std::string(64, 'a'), 0604)).find("mode"), std::string::npos);
@@ -120,6 +121,22 @@ TEST(Replay, NothingOlderOfASenderIsTakenAgain) {
   EXPECT_FALSE(fresh("VES_SAMPLE", 1, 6, 5));
   EXPECT_TRUE(fresh("VES_OPERATOR", 1, 400, 3));
   EXPECT_FALSE(fresh("VES_OPERATOR", 1, 400, 3));
+}
+
+// What was replaced had a later epoch than who is most silent now.
+TEST(Replay, WhoWasForgottenStaysOutWhateverIsSilentSince) {
+  ReplayGuard guard;
+  const auto fresh = [&](std::int64_t source, std::int64_t epoch, std::int64_t sequence) {
+    const Bytes m = encoded(toMessage(LegCommand(), header({source, epoch}, sequence, 0)));
+    return guard.fresh("VES_STATE", m.data());
+  };
+  EXPECT_TRUE(fresh(1, 100, 1));
+  std::int64_t senders = 1;
+  while (fresh(1000 + senders, 5, 1)) ++senders;  // until there is no room
+  EXPECT_GT(senders, 2);
+  EXPECT_TRUE(fresh(2, 200, 1));
+  EXPECT_FALSE(fresh(1, 100, 2));
+  EXPECT_TRUE(fresh(3, 101, 1));
 }
 
 // --- Both ends of a bus with a key

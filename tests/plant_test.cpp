@@ -33,6 +33,18 @@ TEST(Sensor, SettledReadingIsSprocTimesWrench) {  // (2.6)
   for (int i = 0; i < 6; ++i) EXPECT_NEAR(adc[static_cast<std::size_t>(i)], expected(i), 0.5);
 }
 
+TEST(Sensor, TheTruthIsWhatTheConverterReadsUnroundedHoweverWarmItIs) {
+  Experiment e = experiment("free_decay");
+  ASSERT_GT(e.plant.sensor.drift(0), 10.0 * e.plant.sensor.volts_per_count);  // a degree
+  ForceTorqueSensor sensor(e.plant.sensor, Noise(1));
+  sensor.settle({Vec3(100.0, -50.0, 300.0), Vec3(20.0, 10.0, -5.0)});
+  for (const double warmer : {0.0, 3.0, -2.0}) {
+    const Vec6 counts = e.plant.sensor.S_proc() * sensor.reading(warmer).stacked();
+    for (int i = 0; i < 6; ++i)
+      EXPECT_NEAR(sensor.convert(warmer)[static_cast<std::size_t>(i)], counts(i), 0.5 + 1e-9);
+  }
+}
+
 TEST(Sensor, ConverterSaturates) {
   Experiment e = experiment("free_decay");
   ForceTorqueSensor sensor(e.plant.sensor, Noise(1));

@@ -9,6 +9,7 @@
 #include "support/refusal.hpp"
 #include "support/rig.hpp"
 #include "ves/bus/channels.hpp"
+#include "ves/bus/ordered_log.hpp"
 #include "ves/run/flight_record.hpp"
 #include "ves/run/replay.hpp"
 #include "ves/run/run.hpp"
@@ -93,6 +94,29 @@ TEST_F(Replay, RepeatsALogWhoseEventsCameTwiceOrLate) {
   const std::vector<Column> all = columns(straight.experiment);
   for (std::size_t i = 0; i < straight.rows.size(); ++i)
     ASSERT_EQ(csvRow(all, put_right.rows[i]), csvRow(all, straight.rows[i])) << i;
+}
+
+// Who reads along does not wait for good for a tick that is lost.
+TEST_F(Replay, ALostTickIsWaitedForNoLongerThanSixtyFour) {
+  std::int64_t ticks = 0;
+  copy([&](const LogEvent& event) {
+    if (event.channel != channel::kState) return true;
+    ++ticks;
+    return event.as<state_t>()->count != 5;
+  });
+  std::int64_t given = 0, sample = 0, furthest = 0;
+  OrderedLog reader(edited_);
+  for (LogEvent event; reader.next(event);) {
+    if (event.channel == channel::kState) {
+      given = event.as<state_t>()->count;
+      EXPECT_NE(given, 5);
+    }
+    if (event.channel == channel::kSample) sample = event.as<sample_t>()->header.sequence;
+    furthest = std::max(furthest, sample - given);
+  }
+  EXPECT_EQ(given, ticks - 1);
+  EXPECT_GT(furthest, 60);
+  EXPECT_LT(furthest, 70);
 }
 
 // A tick whose sample is late runs on that of the tick before.

@@ -246,6 +246,19 @@ TEST(Figure, IsAProbabilityWithWilsonsInterval) {
     EXPECT_THROW(estimate(bad, {}), InputError) << bad;
 }
 
+TEST(Figure, IsBeyondItsLimitOnTheSideThatIsAskedFor) {
+  const auto beyond = [](const std::string& text, const std::string& cell) {
+    Figure figure(text);
+    figure.find({"a", "b"});
+    return figure.beyond({"0", cell});
+  };
+  EXPECT_EQ(beyond("b>2", "3.5"), 1.5);
+  EXPECT_EQ(beyond("b>2", "0.5"), -1.5);
+  EXPECT_EQ(beyond("b<2", "3.5"), -1.5);
+  EXPECT_EQ(beyond("b<2", "0.5"), 1.5);
+  EXPECT_TRUE(std::isnan(beyond("b<2", "")));
+}
+
 TEST(Figure, HoldsWhereItSaysInNineteenOfTwenty) {
   // A drawn mass ratio above a limit, whose probability is known, from 0.3 to 0.01.
   for (const double p : {0.3, 0.1, 0.01}) {
@@ -488,6 +501,18 @@ TEST(Csv, AFieldIsReadAsItWasWritten) {
     EXPECT_EQ(fields[1], text);
     EXPECT_EQ(fields[2], "z");
   }
+  // A row is a line, whatever its fields say.
+  EXPECT_EQ(csvField("two\nlines"), "\"two lines\"");
+}
+
+TEST(Csv, ColumnsAreSelectedByHowTheirNamesBegin) {
+  std::vector<bool> used(2);
+  EXPECT_FALSE(selected("leg1_measured_m", {"measured", "eg"}, used));
+  EXPECT_TRUE(selected("t_s", {"measured", "eg"}, used));
+  EXPECT_EQ(used, std::vector<bool>({false, false}));
+  EXPECT_TRUE(selected("leg1_measured_m", {"leg1", "z_"}, used));
+  EXPECT_EQ(used, std::vector<bool>({true, false}));
+  EXPECT_TRUE(selected("anything", {}, used));
 }
 
 TEST_F(Sweep, RefusesByName) {

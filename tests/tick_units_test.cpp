@@ -205,6 +205,16 @@ TEST(SensorBias, WhatWasLearntIsKeptWhenATareBegins) {
   EXPECT_EQ(bias.counts(), counts + learnt);
 }
 
+TEST(SensorBias, ACalibrationFindsAllOfItWhateverWasLearntBefore) {
+  SensorBias bias(puma());
+  bias.learn(Vec6::Constant(7.0));
+  bias.beginCalibration();
+  for (int n = 0; n < kCalibrationSamples; ++n)
+    bias.calibrate(reading(100 + (n % 2 ? 4 : -4), n), true, Vec6::Zero());
+  ASSERT_TRUE(bias.calibrated());
+  EXPECT_LT((bias.counts() - Vec6::Constant(100.0)).norm(), 1e-9);
+}
+
 TEST(SensorBias, ATareAveragesNewSamplesOnlyAndRefusesALoad) {
   ControllerConfig config = puma();
   SensorBias bias(config);
@@ -664,6 +674,74 @@ TEST(LegCommander, WhatRoundingLeftIsNotSentOnceItRests) {
   EXPECT_EQ(to.commander.command().counts, legCounts(c.legs, to.commander.reference()));
   to.send(moving(between, 0.0), c.periodSeconds());  // and while it goes on it is sent
   EXPECT_NE(to.commander.command().counts, legCounts(c.legs, to.commander.reference()));
+}
+
+TEST(LegCommander, WhoLetsGoNamesNoSegment) {
+  Sender to(puma());
+  to.send(moving(1.5, 0.1));
+  EXPECT_EQ(to.commander.command().segment, 3);
+  to.commander.release({Vec6::Constant(1.4)});
+  EXPECT_FALSE(to.commander.command().engaged);
+  EXPECT_EQ(to.commander.command().segment, -1);
+  EXPECT_EQ(to.commander.command().rest, legCounts(to.c.legs, Vec6::Constant(1.4)));
+}
+
+TEST(LegCommander, LegsThatWereHeldNoLongerFeelTheirLastTurn) {
+  ControllerConfig c = puma();
+  c.compensation.feed_forward = true;
+  c.servo.friction.setConstant(3e-4);
+  Sender to(c);
+  const double period = c.periodSeconds();
+  for (int n = 0; n < 3; ++n) to.send(moving(1.5, 0.1), period);  // 3 mm: all of a turn
+  to.send(moving(1.5, 0.0), period);
+  EXPECT_GT(std::abs(to.commander.reference()(0) - 1.5), 1e-5);  // the seals still settle
+  to.commander.hold();
+  to.send(moving(1.5, 0.0), period);
+  EXPECT_EQ(to.commander.reference(), Vec6::Constant(1.5));
+}
+
+/// Legs as they are read, tick by tick, by an estimator whose legs were told to rest.
+class Reader {
+ public:
+  Vec6 read(double L, bool following, std::int64_t between = 0) {
+    Sample s = numbered(n_ += 1 + between);
+    s.time = s.legs_time = s.wrench_time = (n_ + 1) * c_.period;
+    s.legs = legCounts(c_.legs, Vec6::Constant(L));
+    samples_.update(s, s.time, following, false);
+    return estimator_.update(samples_, {n_, n_, between, between, 0}, following, to_.commander).L;
+  }
+  /// They are told to move at this speed.
+  void move(double L_dot) { to_.send(moving(1.5, L_dot)); }
+  double jump() const { return c_.safety.reading_jump; }
+  /// [m] that one moved so may have gone further in a tick.
+  double reach(double L_dot) const { return c_.safety.reading_speed * c_.periodSeconds() * L_dot; }
+
+ private:
+  ControllerConfig c_ = puma();
+  std::int64_t n_ = -1;
+  SampleStream samples_{c_.period};
+  LegEstimator estimator_{c_};
+  Sender to_{c_};
+};
+
+TEST(LegEstimator, LegsThatDoNotFollowAreBelievedWhereverTheyAre) {
+  Reader to;
+  to.read(1.5, false);
+  EXPECT_NEAR(to.read(1.4, false)(0), 1.4, 1e-4);  // somebody has moved them
+  EXPECT_NEAR(to.read(1.4, true)(0), 1.4, 1e-4);
+  EXPECT_NEAR(to.read(1.4 + 3.0 * to.jump(), true)(0), 1.4, 1e-4);  // no leg can have
+  EXPECT_NEAR(to.read(1.5, false)(0), 1.5, 1e-4);
+}
+
+TEST(LegEstimator, TicksThatWerePassedOverAreTimeInWhichLegsMove) {
+  for (const std::int64_t between : {0, 4}) {
+    Reader to;
+    to.read(1.5, false);
+    to.move(0.2);
+    to.read(1.5, true);
+    const double L = 1.5 + to.jump() + 3.0 * to.reach(0.2);
+    EXPECT_NEAR(to.read(L, true, between)(0), between > 0 ? L : 1.5, 1e-4) << between;
+  }
 }
 
 TEST(LegEstimator, KnowsHowFarItsModelIsBehind) {

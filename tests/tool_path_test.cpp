@@ -608,6 +608,10 @@ TEST(MovingRobot, RefusesWhatItCannotBegin) {
   EXPECT_EQ(durationOf(slow), 6.0);
   EXPECT_NEAR((slow.joints->at(3.0).q - path.at(1.0).q).norm(), 0.0, 1e-12);
   EXPECT_NEAR((3.0 * slow.joints->at(3.0).q_dot - path.at(1.0).q_dot).norm(), 0.0, 1e-12);
+  path.add(to, {}, 1.0);
+  const JointTrajectory both = path.slower(3.0);
+  for (const double t : {0.5, 1.9, 2.1, 2.9})
+    EXPECT_NEAR(both.at(3.0 * t).q(0), path.at(t).q(0), 1e-12) << t;
 }
 
 }  // namespace

@@ -230,6 +230,19 @@ TEST(VehicleChange, FactorsGoTogether) {
   EXPECT_EQ(before, 1.0);
 }
 
+// Who asks for it at once gets it over a tenth of a second: nothing steps.
+TEST(VehicleChange, TakesATenthOfASecondAtLeast) {
+  const VehicleMatrices m = matrices(false);
+  AdmittanceModel model(modesOf(m.M, m.C, m.K), kTickSeconds);
+  VehicleChange change(kTickSeconds, 10.0);
+  model.reset(Vec6::Zero());
+  change.begin({{2.0, 3.0, 0.5}, 0.0}, model);
+  for (int k = 1; k <= 12; ++k) {
+    change.advance(model);
+    EXPECT_NEAR(model.factors().stiffness, 1.0 - 0.5 * std::min(1.0, 0.1 * k), 1e-12) << k;
+  }
+}
+
 TEST(VehicleChange, ArrivesInItsTimeWhereTheVehicleSwings) {
   const VehicleMatrices m = matrices(false);
   AdmittanceModel model(modesOf(m.M, m.C, m.K), kTickSeconds);

@@ -840,7 +840,8 @@ std::vector<std::uint8_t> bytesOf(const std::string& base64) {
 
 // Every tick of every column, whatever the rate of the pictures; as exact as 16 bits are.
 TEST(Page, HasEveryTickOfEveryColumn) {
-  const RecordedRun run = puma();
+  RecordedRun run = puma();
+  run.series.rows[7].has_sample = false;  // a gap in what is the same all the time, too
   std::vector<std::string> warnings;
   const auto shown = recording(run.series, 5.0, warnings)["columns"];
   const std::vector<Row>& rows = run.series.rows;
@@ -952,7 +953,7 @@ class Live : public testing::Test {
     leg_command_t command{};
     command.header = state.header;
     command.machine = 77;
-    controllers.publish(channel::kLegCommand, command);
+    if (!silent) controllers.publish(channel::kLegCommand, command);
     controllers.publish(channel::kState, state);
   }
   void describe(std::int64_t source, std::int64_t epoch, const std::vector<std::string>& set = {}) {
@@ -1000,7 +1001,7 @@ class Live : public testing::Test {
   SegmentKind kind = SegmentKind::kMove;
   std::set<std::pair<std::int64_t, std::int64_t>> orders;
   operator_t last{};
-  bool answers = true;
+  bool answers = true, silent = false;  // silent: to its machine
 };
 
 TEST_F(Live, WhoJoinsLateAsksForTheConfigurationAndHasTheSameTime) {
@@ -1099,6 +1100,23 @@ TEST_F(Live, ShowsTheControllerThatHasTheLegs) {
   EXPECT_EQ(live.edition(), 1);
   describe(10, 200);
   until(10, 200, true, [&] { return live.edition() == 2; });  // it has the legs, and is the newest
+}
+
+TEST_F(Live, NothingOfOneControllerIsTakenForAnothers) {
+  describe(9, 100);
+  until(9, 100, true, [&] { return live.newest() > 10; });
+  const std::int64_t before = live.newest();
+  describe(10, 200);
+  silent = true;
+  until(10, 200, true, [&] { return live.edition() == 2 && live.newest() > before; });
+  ask("push 2 platform 20 0 0 0.2 0 0 0.1");  // whose machine is not known yet
+  until(10, 200, true, [n = 0]() mutable { return ++n > 20; });
+  EXPECT_TRUE(pushes.empty());
+  std::int64_t got = 0;
+  const std::string bytes = live.pictures(0, got);
+  EXPECT_LE(
+      (bytes.size() - 24) / 4 / nlohmann::json::parse(live.scene())["width"].get<std::size_t>(),
+      static_cast<std::size_t>(live.newest() - before));
 }
 
 TEST_F(Live, AStopIsRepeatedUntilItIsTakenAndIsOneOrder) {

@@ -341,6 +341,51 @@ class Arrays(unittest.TestCase):
             np.testing.assert_array_equal(again(run).pose(), run.pose())
         self.assertEqual(len(run.plot().axes), 2)
 
+    def test_settings_are_what_the_commands_take(self):
+        self.assertEqual(ves._settings({"a": [1, True, np.float32(0.5)], "b": {"c": np.array([1.5, 2]), "d": (1,)},
+                                        "e": np.bool_(False), "f": "x", "g": np.int64(7)}),
+                         ["a=[1, true, 0.5]", "b={c: [1.5, 2.0], d: [1]}", "e=false", "f=x", "g=7"])
+
+    def test_a_robot_stands_on_earth_where_nothing_else_is_said(self):
+        r, q = ves.load_robot("puma560"), random.uniform(-1, 1, 6)
+        for ours, theirs in zip(ves.newton_euler(r, q, q, q),
+                                ves.newton_euler(r, q, q, q, [0, 0, 0], [0, 0, 0], [0, 0, 9.81])):
+            np.testing.assert_array_equal(ours, theirs)
+
+    def test_a_stiffness_that_pushes_away_is_refused(self):
+        one = np.eye(6)
+        self.assertEqual(len(ves.modes(one, 0 * one, 0 * one).stiffness), 6)  # afloat
+        K = one.copy()
+        K[0, 1] = K[1, 0] = 1.1  # eigenvalues 2.1 and -0.1
+        with self.assertRaisesRegex(ValueError, "stiffness: has a negative eigenvalue"):
+            ves.modes(one, 0 * one, K)
+
+    def test_a_plot_is_of_the_run_in_mm_and_degrees(self):
+        run = ves.run("z_sine", {"program": "[{move: {to: {z_m: 0.05, beta_deg: 0.2}}}]"})
+        figure = run.plot("measured")
+        self.assertEqual([a.get_ylabel() for a in figure.axes], ["position [mm]", "angle [deg]"])
+        self.assertEqual(figure.axes[1].get_xlabel(), "time [s]")
+        for axes, first, names, scale in zip(figure.axes, (0, 3), ("xyz", ("alpha", "beta", "gamma")), (1e3, 180 / np.pi)):
+            self.assertEqual([t.get_text() for t in axes.get_legend().get_texts()], list(names))
+            self.assertEqual(len(axes.lines), 6)
+            for k, line in enumerate(axes.lines):
+                which = "commanded" if k % 2 else "measured"
+                np.testing.assert_array_equal(line.get_xdata(), run["t_s"])
+                np.testing.assert_allclose(line.get_ydata(), scale * run.pose(which)[:, first + k // 2])
+        low, high = figure.axes[1].get_ylim()  # a fifth of a degree is not blown up
+        self.assertAlmostEqual(high - low, 1.0)
+        self.assertTrue(low < 0.0 and high > 0.2)
+        low, high = figure.axes[0].get_ylim()
+        self.assertTrue(-10 < low < 0 and 50 < high < 60)
+        with self.assertRaisesRegex(ValueError, "which: 'true', want one of actual, commanded, measured"):
+            run.pose("true")
+        ticks = len(run["t_s"])
+        self.assertEqual([repr(x) for x in (run, ves.Run(run.columns, "stopped", "pressure"), ves.load_platform("z_sine"),
+                                            ves.load_robot("puma560"), ves.load_base("table_4_1"))],
+                         [f"<ves.Run, {ticks} ticks, parked>", f"<ves.Run, {ticks} ticks, stopped by pressure>",
+                          f"<ves.Platform, home at {ves.load_platform('z_sine').home_height:g} m>",
+                          "<ves.Robot, 6 joints>", "<ves.Base, 6 modes>"])
+
     def test_another_numpy_is_refused_before_it_ends_the_process(self):
         done = subprocess.run([sys.executable, "-c", "import numpy; numpy.__version__ = '2.1.0'; import ves"],
                               text=True, capture_output=True, check=False)
