@@ -116,7 +116,7 @@ TEST_F(ReceiverOnABus, HearsWhatLcmSaysWholeAndInParts) {
 
 TEST_F(ReceiverOnABus, TakesNoMoreOfAChannelThanItMayHave) {
   lcm::LCM lcm("udpm://239.255.76.67:7667?ttl=0");
-  for (const std::size_t longest : {16, 4096, 1024}) receiver_.hear("SHORT", longest);
+  for (const std::size_t longest : {16u, 4096u, 1024u}) receiver_.hear("SHORT", longest);
   const std::string fits(4096, 'a'), longer(4097, 'b'), parts(1'000'000, 'c');
   for (const std::string& data : {parts, longer, fits})
     lcm.publish("SHORT", data.data(), static_cast<unsigned>(data.size()));
