@@ -360,6 +360,24 @@ class Arrays(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "stiffness: has a negative eigenvalue"):
             ves.modes(one, 0 * one, K)
 
+    def test_what_is_taken_ends_at_its_limits(self):
+        r, b, z = ves.load_robot("puma560"), ves.load_base("table_4_1"), np.zeros(6)
+        joints = ves.load_platform("desk").base_joints
+        for low, high, call in ((0, 1e3, lambda x: ves.gravity_wrench(r, z, gravity=x)),
+                                (1e-6, 1e6, lambda x: ves.Platform(joints, joints, x)),
+                                (-1e3, 1e3, lambda x: ves.admittance_step(b, z, z, z, x)),
+                                (0, 1e12, lambda x: ves.second_order_hold(x, 0, 0)),
+                                (0, 1e9, lambda x: ves.second_order_hold(1, x, 0)),
+                                (0, 1e3, lambda x: ves.second_order_hold(1, 1, x)),
+                                (0, 1e6, lambda x: ves.appendix_e_roots(x, 100, 0.1)),
+                                (2, 1e9, lambda x: ves.appendix_e_roots(1, x, 0.1)),
+                                (0, 0.999999, lambda x: ves.appendix_e_roots(1, 100, x)),
+                                (0, 2**32 - 1, lambda x: ves.run("z_sine", {"program": "[{move: {}}]"}, x))):
+            call(low), call(high)
+            for beyond in np.nextafter(low, -np.inf), np.nextafter(high, np.inf):
+                with self.assertRaisesRegex(ValueError, "want a number in"):
+                    call(beyond)
+
     def test_a_plot_is_of_the_run_in_mm_and_degrees(self):
         run = ves.run("z_sine", {"program": "[{move: {to: {z_m: 0.05, beta_deg: 0.2}}}]"})
         figure = run.plot("measured")
