@@ -9,6 +9,7 @@
 
 #include "support/leg.hpp"
 #include "support/rig.hpp"
+#include "ves/control/leg_estimator.hpp"
 
 namespace ves {
 namespace {
@@ -228,6 +229,60 @@ TEST(ServoAdaptation, AReadingCountsUpToFiveOfItsDeviations) {
     EXPECT_TRUE(learntFrom(4.9 * sign));
     EXPECT_FALSE(learntFrom(5.1 * sign));
   }
+}
+
+/// Six legs of the machine that go alike, as a controller that adapts reads them.
+class Adapting {
+ public:
+  /// Legs whose gains are `factor` times the believed ones.
+  void become(double factor) {
+    leg_.config.actuator.gain_extend = factor * e_.plant.actuator.gain_extend;
+    leg_.config.actuator.gain_retract = factor * e_.plant.actuator.gain_retract;
+    leg_.actuator = plant::Actuator(leg_.config.actuator, leg_.actuator.length());
+  }
+  /// A tick with the legs told to be at r [m]; by us, where they follow.
+  void tick(double r, bool following) {
+    const LegCounts counts = legCounts(e_.controller.legs, Vec6::Constant(r));
+    if (following) estimator_.sent(counts, k_, k_ * kTick);
+    leg_.run(counts[0], kPeriod);
+    Sample s;
+    s.sequence = k_;
+    s.time = s.legs_time = s.wrench_time = ++k_ * kTick;
+    s.legs.fill(leg_.config.transducer.count(leg_.actuator.length()));
+    samples_.update(s, s.time, following, false);
+    estimator_.update(samples_, {k_, k_, 0, 0, 0}, following, nothing_);
+  }
+  void swing(double about, double seconds) {
+    for (int n = 0; n < std::lround(seconds / kPeriod); ++n) {
+      const double t = n * kPeriod;
+      tick(about + 0.008 * std::sin(2.0 * M_PI * 0.9 * t) + 0.002 * std::sin(2.0 * M_PI * 2.3 * t),
+           true);
+    }
+  }
+  double extend() const { return estimator_.gains().extend(0) / e_.controller.servo.extend(0); }
+
+ private:
+  Experiment e_ = test::experiment("z_sine", {"controller.compensation.feed_forward=true",
+                                              "controller.compensation.observer=true",
+                                              "controller.compensation.adaptation=true"});
+  test::Leg leg_{e_.plant, 1.5};
+  SampleStream samples_{kTick};
+  LegCommander nothing_{e_.controller};
+  LegEstimator estimator_{e_.controller};
+  std::int64_t k_ = 0;
+};
+
+TEST(ServoAdaptation, GoesOnAfterSomebodyElseHasMovedTheLegs) {
+  Adapting one;
+  one.become(1.04);
+  for (int n = 0; n < 10; ++n) one.tick(1.5, false);
+  one.swing(1.5, 20.0);
+  EXPECT_NEAR(one.extend(), 1.04, 0.015);
+  for (int n = 0; n < 100; ++n) one.tick(1.6, false);
+  EXPECT_NEAR(one.extend(), 1.04, 0.015);
+  one.become(0.97);
+  one.swing(1.6, 90.0);
+  EXPECT_NEAR(one.extend(), 0.97, 0.02);
 }
 
 TEST(ServoAdaptation, WithoutDoubtOfTheBeliefNothingIsLearnt) {
