@@ -21,9 +21,8 @@ void Asking::say(Bus& bus, std::int64_t now) noexcept {
 
 void Asking::hear(const state_t& state) noexcept {
   const auto refusal = static_cast<Refusal>(state.refusal);
-  if (underWay() && state.header.source == order_.controller &&
-      state.order_source == from_.source && state.order_sequence == sequence_ &&
-      refusal != Refusal::kChecking)
+  if (!answer_ && state.header.source == order_.controller && state.order_source == from_.source &&
+      state.order_sequence == sequence_ && refusal != Refusal::kChecking)
     answer_ = refusal;
 }
 

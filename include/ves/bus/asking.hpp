@@ -21,8 +21,9 @@ class Asking {
   /// For every state of the controller that is asked: an answer may show in one of them only.
   void hear(const state_t& state) noexcept;
 
-  /// Why it was refused, or that it was not. Nothing: not answered, as underWay() says not yet or
-  /// not in all its time. That its path is being checked is no answer.
+  /// Why it was refused, or that it was not; late is better than never. Nothing: not answered yet,
+  /// or, where it is no longer underWay(), not in all its time. That its path is being checked is
+  /// no answer.
   const std::optional<Refusal>& answer() const noexcept { return answer_; }
   bool underWay() const noexcept { return !answer_ && !given_up_; }
 
