@@ -305,6 +305,8 @@ TEST_F(Programs, RealTimeRunOfTwoProcesses) {
 
   // The table has them beside their ticks, and nothing where there are none.
   const Series series = readSeries((folder_ / "a/run.lcmlog").string());
+  EXPECT_NEAR(s["simulated_s"].get<double>(),
+              0.01 * static_cast<double>(series.rows.back().state.header.sequence + 1), 1e-9);
   const std::vector<Column> table = columns(series.experiment);
   const auto late =
       std::find_if(table.begin(), table.end(), [](const Column& c) { return c.name == "late_s"; });
