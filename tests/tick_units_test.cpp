@@ -700,7 +700,7 @@ TEST(LegCommander, LegsThatWereHeldNoLongerFeelTheirLastTurn) {
   EXPECT_EQ(to.commander.reference(), Vec6::Constant(1.5));
 }
 
-/// Legs as they are read, tick by tick, by an estimator whose legs were told to rest.
+/// What an estimator believes of six equal legs, tick by tick; they are told to rest until move().
 class Reader {
  public:
   Vec6 read(double L, bool following, std::int64_t between = 0) {

@@ -196,17 +196,17 @@ HydraulicLeg::Moved HydraulicLeg::moved(double dy, double dt,
   // The bristles, exactly while the speed stays.
   const SealModel& s = model_.seals;
   out.z = z_;
-  if (s.bristle > 0.0) out.friction = steadyFriction(s, dy / dt);
-  if (s.bristle > 0.0 && dy != 0.0) {
+  if (s.bristle > 0.0) {
+    out.friction = steadyFriction(s, dy / dt);
     const double end = std::copysign(out.friction / s.bristle, dy);
-    out.z = end + (z_ - end) * std::exp(-std::abs(dy / end));
+    if (dy != 0.0) out.z = end + (z_ - end) * std::exp(-std::abs(dy / end));
   }
   return out;
 }
 
-/// With a piston whose joints have play: y = L + s f, with the play as the spring s until they are
-/// seated, which they mostly are and stay. By bisection and regula falsi (Illinois): the seats are
-/// kinks.
+/// moved() of a piston whose joints have play: y = L + s f, with the play as the spring s until
+/// they are seated. Mostly they are and stay, and the end where they were is all that is looked at;
+/// else by bisection and regula falsi (Illinois): the seats are kinks.
 HydraulicLeg::Moved HydraulicLeg::movedThroughPlay(double length, double dt,
                                                    const std::array<Flow, 2>& flow) const noexcept {
   constexpr double kClose = 1e-13;  // [m]
@@ -220,9 +220,8 @@ HydraulicLeg::Moved HydraulicLeg::movedThroughPlay(double length, double dt,
     return End{m, y_ + dy - length - s * std::clamp(jointForce(m.p, m.z), -seat, seat)};
   };
   const double lowest = length - s * seat - y_, highest = length + s * seat - y_;
-  const bool pressed = jointForce(p_, z_) > 0.0;
   End hi, lo;
-  if (pressed) {
+  if (jointForce(p_, z_) > 0.0) {
     hi = at(highest);
     if (hi.off <= kClose) return hi.moved;
     lo = at(lowest);
