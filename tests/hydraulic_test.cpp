@@ -450,6 +450,27 @@ TEST(HydraulicPlatform, BalancesItsEnergy) {
 
 // --- Faults -------------------------------------------------------------------------------------
 
+TEST(HydraulicFaults, ALegWhoseSupplyHasFallenBalancesItsEnergy) {
+  constexpr double kMass = 20.0;  // [kg]
+  for (const char* circuit : kCircuits) {
+    const Experiment e = machine(circuit);
+    const double load = plateLoad(e);
+    HydraulicLegModel low = e.plant.hydraulic->leg;
+    low.oil.supply *= 0.6;
+    PushedMass m(e.plant.hydraulic->leg, kMass, load);
+    m.run(0.005, 0.2);
+    m.become(low);
+    const auto account = [&] {  // [J] in store, given to the load and lost, less what was supplied
+      const HydraulicLosses& l = m.leg().losses();
+      return m.leg().stored() + 0.5 * kMass * m.speed() * m.speed() + load * m.length() + l.valve +
+             l.leak + l.seals + l.stops - l.supplied;
+    };
+    const double before = account(), supplied = m.leg().losses().supplied;
+    for (int n = 0; n < 10; ++n) m.run(n % 2 ? 0.004 : -0.004, 0.1);
+    EXPECT_NEAR(account(), before, 1e-4 * (m.leg().losses().supplied - supplied)) << circuit;
+  }
+}
+
 TEST(HydraulicFaults, SpeedsAreThoseOfWhatIsLeft) {
   // A leg without seals or leaks, extending: A v = k x sqrt(p_S - p), p = (A_2 p_S + F)/A_1.
   const Experiment e = machine("three_way", kOilAlone);
